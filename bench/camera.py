@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from volery.autonomy.markers import CameraModel, MarkerFinder, marker_cells
-from volery.simulation.world.rasteriser import Lens, Rasteriser, View
+from volery.simulation.world.rasteriser import CameraView, Lens, Rasteriser
 from volery.simulation.world.scene import DUSK_LUX, Marker, Solid
 
 BOXES = 240  # of ten triangles each
@@ -84,8 +84,8 @@ def main() -> None:
     bent = Lens(distortion=(-0.2, 0.05, 0.001, -0.001, 0.0))
     plain = Rasteriser(Lens(), solids(), [marker])
     full = Rasteriser(bent, solids(), [marker], noise=np.uint64(1))
-    still = View((0.0, 0.0, HEIGHT), DOWN)
-    moving = View((0.0, 0.0, HEIGHT), DOWN, (3.0, 1.0, 0.5), (0.3, 0.3, 0.2))
+    still = CameraView((0.0, 0.0, HEIGHT), DOWN)
+    moving = CameraView((0.0, 0.0, HEIGHT), DOWN, (3.0, 1.0, 0.5), (0.3, 0.3, 0.2))
     times = [
         timed(lambda: plain.draw(still, 0.0), rounds),
         timed(lambda: full.draw(moving, 0.0, DUSK_LUX), rounds),

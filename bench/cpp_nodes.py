@@ -15,7 +15,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from time import process_time
 
-from volery.components.cpp.build import ClientLibrary, CompiledComponent, CppComponent, compile_component
+from volery.components.cpp.build import CompiledComponent, CppComponent, LibraryHeaders, compile_component
 from volery.components.cpp.cpp_program import CppProgram
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -64,8 +64,8 @@ int main(int argc, char** argv) {
 }
 """
 LIBRARIES = {
-    "roscpp": ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers),
-    "rclcpp": ClientLibrary((rclcpp.INCLUDE,), rclcpp.FALLBACK, rclcpp.generate_headers),
+    "roscpp": LibraryHeaders((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers),
+    "rclcpp": LibraryHeaders((rclcpp.INCLUDE,), rclcpp.FALLBACK, rclcpp.generate_headers),
 }
 
 

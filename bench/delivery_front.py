@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from volery.explore.campaign import CampaignRequest, prepare
-from volery.explore.points import Point, Row, Value
+from volery.explore.points import CampaignRow, Value, VariantPoint
 from volery.explore.search import (
     Front,
     Objective,
@@ -124,7 +124,7 @@ def remembered(function: Known) -> Known:
     known: dict[str, Any] = {}
 
     def of(values: Mapping[str, Value]) -> Any:
-        key = Point(values).variant
+        key = VariantPoint(values).variant
         if key not in known:
             known[key] = function(values)
         return known[key]
@@ -157,7 +157,7 @@ def measure(chosen: argparse.Namespace, out: Path) -> None:
     )
     with prepare(request) as campaign:
         of_price = hardware_cost(str(path), "USD")
-        price = remembered(lambda values: of_price.value(Row(0, Point(values))))
+        price = remembered(lambda values: of_price.value(CampaignRow(0, VariantPoint(values))))
         objectives = [
             Objective("application.computing_energy"),
             Objective("application.delivery_time_max"),
@@ -165,8 +165,8 @@ def measure(chosen: argparse.Namespace, out: Path) -> None:
         ]
         discard = remembered(analysis_discards(str(path), "times"))
 
-        def evaluate(points: Sequence[Point]) -> list[Row]:
-            rows = campaign.evaluate([Point(one.values, SEED) for one in points])
+        def evaluate(points: Sequence[VariantPoint]) -> list[CampaignRow]:
+            rows = campaign.evaluate([VariantPoint(one.values, SEED) for one in points])
             return [replace(row, point=one) for row, one in zip(rows, points, strict=True)]
 
         def searched(seed: int, evaluations: int, why: Known | None) -> Front:
@@ -196,17 +196,17 @@ def compare(
     exact: Front,
     searched: Callable[[int, int, Known | None], Front],
     discard: Known,
-    evaluate: Callable[[Sequence[Point]], list[Row]],
+    evaluate: Callable[[Sequence[VariantPoint]], list[CampaignRow]],
     objectives: Sequence[Objective],
 ) -> None:
     """Print the hypervolumes of search and of random sampling at the same number of runs."""
     every = [dict(zip(SPACE, one, strict=True)) for one in product(*(p.values for p in SPACE.values()))]
     possible = [one for one in every if not discard(one)]
-    rows = {row.point.variant: row for row in evaluate([Point(one) for one in possible])}
+    rows = {row.point.variant: row for row in evaluate([VariantPoint(one) for one in possible])}
 
     def scores(variants: Sequence[Mapping[str, Value]]) -> Any:
         """Return what the feasible variants score; those that are discarded are known to be none."""
-        found = [rows[key] for one in variants if (key := Point(one).variant) in rows]
+        found = [rows[key] for one in variants if (key := VariantPoint(one).variant) in rows]
         good = [row for row in found if all(row.verdicts.get(name) for name in CONSTRAINTS)]
         return np.array([[one.value(row) for one in objectives] for row in good]).reshape(-1, 3)
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from volery.base.errors import LinkLost
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.control.flight import ControlledFlight
-from volery.control.manoeuvres import Altitude, Manoeuvre, Rotation, Waypoints
+from volery.control.manoeuvres import Altitude, LawManoeuvre, Rotation, Waypoints
 from volery.control.safety_switch import SwitchSettings
 from volery.kernel.waiting import sleep
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
@@ -49,11 +49,11 @@ class Seen(NamedTuple):
 class Phase(NamedTuple):
     """What is flown, and the moment at which the switch moves."""
 
-    make: Callable[[], Manoeuvre]
+    make: Callable[[], LawManoeuvre]
     reached: Callable[[Seen], bool]
 
 
-def _turns() -> Manoeuvre:
+def _turns() -> LawManoeuvre:
     return Rotation([0.0, 90.0], 6.0)
 
 

@@ -26,8 +26,8 @@ import pyarrow as pa
 from explore_stub import OBSERVABLES
 from volery.explore.campaign import Campaign, CampaignRequest, prepare
 from volery.explore.campaign_store import CampaignStore
-from volery.explore.points import Point, Row
-from volery.explore.run_process import Task
+from volery.explore.points import CampaignRow, VariantPoint
+from volery.explore.run_process import PlannedRun
 from volery.explore.specification import run_seed
 from volery.kernel import virtual
 from volery.run.result import Options
@@ -197,7 +197,7 @@ def on_paper(delivery_s: float, row_s: float, deliveries: Path, runs: float = 1e
     """Say what a large campaign of deliveries costs by what was measured, and what is full first."""
     with Campaign(deliveries) as campaign:
         row = campaign.row(0)
-        task = Task(campaign.setting, row.run, row.point)
+        task = PlannedRun(campaign.setting, row.run, row.point)
     traffic, stored = len(pickle.dumps(task)) + len(pickle.dumps(row)), 8 * len(row.observables) + 100
     wall_s = runs * delivery_s / cores
     rate = runs / wall_s
@@ -213,13 +213,13 @@ def on_paper(delivery_s: float, row_s: float, deliveries: Path, runs: float = 1e
 
 def stores(rows: int, folder: Path) -> None:
     """Compare the store with an Arrow stream, a batch a row, as each row must be safe when it is written."""
-    points = [Point({}, seed) for seed in range(rows)]
+    points = [VariantPoint({}, seed) for seed in range(rows)]
     values = {f"subject.quantity_{place}": place / 7.0 for place in range(OBSERVABLES)}
     store = CampaignStore(folder / "sqlite", write=True)
     store.ask(points)
     before = process_time()
     for number, point in enumerate(points):
-        store.record([Row(number, point, "completed", "", {}, values)])
+        store.record([CampaignRow(number, point, "completed", "", {}, values)])
     print(
         f"SQLite: {1e6 * (process_time() - before) / rows:.0f} µs a row, "
         f"{_size(folder / 'sqlite') / rows:.0f} bytes"

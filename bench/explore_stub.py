@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from volery.explore.executors import executors
-from volery.explore.points import Row
+from volery.explore.points import CampaignRow
 
 OBSERVABLES = 51
 """As many as a run of the starter has."""
@@ -27,7 +27,7 @@ class Stub(Executor):
         observables = {f"subject.quantity_{place}": float(one) for place, one in enumerate(values)}
         verdicts = {"landing": bool(values[0] < 0.97), "battery": True}
         future.set_result(
-            Row(task.run, task.point, "completed", "", verdicts, observables, 100.0, 0.3, 0.3, "stub")
+            CampaignRow(task.run, task.point, "completed", "", verdicts, observables, 100.0, 0.3, 0.3, "stub")
         )
         return future
 

@@ -29,10 +29,10 @@ from volery.links.in_process_link import in_process_pair
 from volery.run.connect import SCRIPT
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.real_firmware.family import PROJECTS, RealFirmwareFamily
-from volery.simulation.real_firmware.firmware_instance import Assignment, Instance
+from volery.simulation.real_firmware.firmware_instance import Assignment, FirmwareInstance
 from volery.simulation.real_firmware.lock_step import READ_EVERY, RealFirmware
 from volery.simulation.real_firmware.px4 import CLOCK_START, SENSOR, ControlsReader
-from volery.simulation.world.body_specs import BodySpec, Multirotor, Rover
+from volery.simulation.world.body_specs import BodySpec, Multirotor, WheeledRover
 from volery.simulation.world.state_layout import M_ACCEL
 from volery.vehicles import Drone
 from volery.vehicles.driver import drivers
@@ -55,7 +55,7 @@ def programs() -> list[Program]:
     """Return the programs that the environment names."""
     known = (
         ("ArduCopter", "ardupilot", "VOLERY_ARDUCOPTER", Multirotor),
-        ("ArduRover", "ardupilot", "VOLERY_ARDUROVER", Rover),
+        ("ArduRover", "ardupilot", "VOLERY_ARDUROVER", WheeledRover),
         ("PX4", "px4", "VOLERY_PX4", Multirotor),
     )
     return [
@@ -83,7 +83,7 @@ def bare(program: Program, seconds: float) -> float:
             instance.process.end()
 
 
-def _same_samples(project: str, instance: Instance, flight: Flight, seconds: float) -> float:
+def _same_samples(project: str, instance: FirmwareInstance, flight: Flight, seconds: float) -> float:
     exchange, row = instance.exchange, list(flight.row)
     period, clock = exchange.period, 0
     while clock < BOOT:  # the start script of PX4 answers nothing

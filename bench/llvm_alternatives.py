@@ -35,7 +35,7 @@ from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import blocks_of, static_costs
 from volery.cost.native.compilation import (
     HOST_TARGET,
-    Program,
+    OptimisedCode,
     compile_program,
     llvm_toolchain,
     run_tool,
@@ -80,7 +80,7 @@ void __sanitizer_cov_pcs_init(const uintptr_t *at, const uintptr_t *end) {}
 """What instrumented code calls: the least that links and counts."""
 
 
-def mca_costs(program: Program) -> tuple[Any, Any]:
+def mca_costs(program: OptimisedCode) -> tuple[Any, Any]:
     """Return cycles per entry of each block: in a steady state, and as reciprocal throughput."""
     machine = MachineCode(program.blocks, program.machine_blocks)
     text = [".intel_syntax noprefix", ".L0:"]
@@ -108,7 +108,7 @@ def mca_costs(program: Program) -> tuple[Any, Any]:
     return steady, throughput
 
 
-def timers(program: Program, folder: Path) -> dict[str, Path]:
+def timers(program: OptimisedCode, folder: Path) -> dict[str, Path]:
     """Build the kernel's timing program without counters, with ours and with each of LLVM's passes."""
     tools = llvm_toolchain()
     (folder / "runtime.c").write_text(RUNTIME, encoding="utf-8")

@@ -33,7 +33,7 @@ from volery.calibration.queue_measurement import measure_queues
 from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import BlockCosts, traced_costs
-from volery.cost.native.compilation import Program, compile_program, run_tool
+from volery.cost.native.compilation import OptimisedCode, compile_program, run_tool
 from volery.cost.native.instrumented_run import (
     WINDOW,
     Invocation,
@@ -88,7 +88,7 @@ def wanted(given: int) -> Invocation:
     return Invocation("kernel", (f"prepare({given})",))
 
 
-def costs_of(program: Program, folder: Path, run: Invocation) -> BlockCosts:
+def costs_of(program: OptimisedCode, folder: Path, run: Invocation) -> BlockCosts:
     program.traced_object(folder / "traced.o")
     executable = build_executable(program, run, folder / "traced.o", folder)
     ran = trace_blocks(executable, run, folder, WINDOW, program.law.memory)
@@ -152,7 +152,7 @@ def on_this_machine(paths: list[Path], rounds: int) -> None:
     print(f"slowdown: median {median(slower):.2f}x, worst {max(slower):.2f}x\n")
 
 
-def executed(program: Program, given: int, folder: Path) -> int:
+def executed(program: OptimisedCode, given: int, folder: Path) -> int:
     """Instructions of the program's own functions in one activation, as qemu-aarch64 executes them."""
     (folder / "code.s").write_text(program.assembly, encoding="utf-8")
     (folder / "main.c").write_text(MAIN.format(input=given), encoding="utf-8")

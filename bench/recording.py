@@ -20,23 +20,25 @@ from mcap.writer import CompressionType, Writer
 from volery.report.digest import Digest
 from volery.requirements.accounts import Accounts
 from volery.testing.sample_run import sample_events, sample_setup
-from volery.trace.encoding import OWN_EVENTS, Codec, type_name
+from volery.trace.encoding import OWN_EVENTS, EventCodec, type_name
 from volery.trace.events import Event, Published, Slice
 from volery.trace.mcap_writer import McapWriter
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 from volery.trace.timeline import TimelineWriter
 
 
 def library(path: Path, events: Sequence[Event]) -> Callable[[], None]:
     """The same messages through the library, encoded beforehand."""
-    codecs = {kind: Codec(kind) for kind in OWN_EVENTS}
+    codecs = {kind: EventCodec(kind) for kind in OWN_EVENTS}
     encoded = [codecs[type(event)].encode(event) for event in events]
 
     def write() -> None:
         with path.open("wb") as file:
             writer = Writer(file, compression=CompressionType.NONE)
             writer.start("ros2", "bench")
-            schema = writer.register_schema(type_name(Slice), "ros2msg", Codec(Slice).definition.encode())
+            schema = writer.register_schema(
+                type_name(Slice), "ros2msg", EventCodec(Slice).definition.encode()
+            )
             channel = writer.register_channel("/events", "cdr", schema)
             for number, data in enumerate(encoded):
                 writer.add_message(channel, number, data, number)
@@ -76,7 +78,7 @@ def fold(make: Callable[[], Callable[[Event], None]], events: Sequence[Event]) -
 
 def reader(path: Path) -> Callable[[], None]:
     def run() -> None:
-        with Reading(path) as reading:
+        with OpenTrace(path) as reading:
             for _ in reading.events():
                 pass
 

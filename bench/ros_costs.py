@@ -29,7 +29,7 @@ from volery.calibration.host_machine import put_law, this_machine
 from volery.calibration.node_comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
 from volery.calibration.node_processes import MeasuredRun, measurement_session
 from volery.calibration.ros.call_costs import CallCost, Round, call_costs
-from volery.calibration.ros.campaign import Conditions, Plan, format_line, ros_law, write_entry
+from volery.calibration.ros.campaign import Conditions, RoundPlan, format_line, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, check_client, probe_setup
 from volery.cli.commands.cost import comparison_tables
 from volery.cost import load_catalogue
@@ -54,7 +54,7 @@ class Campaign:
         self.catalogue = folder / f"{client}.yaml"
         self.rounds: list[Round] = []
         self.runs: list[MeasuredRun] = []
-        self.plan = Plan(pace=PACE)
+        self.plan = RoundPlan(pace=PACE)
         self._stack = ExitStack()
 
     def open(self) -> None:

@@ -18,9 +18,9 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
-from volery.explore.points import Point, Row
+from volery.explore.points import CampaignRow, VariantPoint
 from volery.explore.search import front_of, hypervolume, search
-from volery.explore.space import Range
+from volery.explore.space import RangeParameter
 
 PROBLEMS = ("zdt1", "zdt2", "zdt3", "zdt4", "zdt6", "dtlz2")
 NOISE = 0.05
@@ -29,7 +29,7 @@ NOISE = 0.05
 def our_search(problem: Any, seed: int, evaluations: int, noise: float = 0.0) -> Any:
     """Return the true objectives of the front that the search reports."""
     space = {
-        f"x{n}": Range(float(low), float(high))
+        f"x{n}": RangeParameter(float(low), float(high))
         for n, (low, high) in enumerate(zip(problem.xl, problem.xu, strict=True))
     }
     names = [f"f{n}" for n in range(problem.n_obj)]
@@ -37,12 +37,12 @@ def our_search(problem: Any, seed: int, evaluations: int, noise: float = 0.0) ->
     def truth(variants: Sequence[Any]) -> Any:
         return problem.evaluate(np.array([[one[name] for name in space] for one in variants]))
 
-    def evaluate(points: Sequence[Point]) -> list[Row]:
+    def evaluate(points: Sequence[VariantPoint]) -> list[CampaignRow]:
         rows = []
         for point, exact in zip(points, truth([one.values for one in points]), strict=True):
             random = np.random.default_rng([point.seed, *point.variant.encode()])
             values = exact * (1.0 + noise * random.standard_normal(len(exact)))
-            rows.append(Row(0, point, observables=dict(zip(names, map(float, values), strict=True))))
+            rows.append(CampaignRow(0, point, observables=dict(zip(names, map(float, values), strict=True))))
         return rows
 
     front = search(

@@ -27,7 +27,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.mavlink_messages import message_type
-from volery.model.airframes import Battery
+from volery.model.airframes import BatterySpec
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simulated
 from volery.run.assembly.vehicle_nodes import PrivateGraph, open_simulated_driver, reached_over_links
@@ -117,7 +117,7 @@ def described(name: str) -> SimulatedVehicle:
     """Return a vehicle of the table with its battery."""
     autopilot, _, kind = name.partition("-")
     wanted = parse_simulated(parse(f"sim:{autopilot}?start=warm&kind={kind or 'multirotor'}"), autopilot)
-    return replace(wanted, vehicle=replace(wanted.vehicle, battery=Battery(CAPACITY_AH * 3600.0)))
+    return replace(wanted, vehicle=replace(wanted.vehicle, battery=BatterySpec(CAPACITY_AH * 3600.0)))
 
 
 def measure(name: str, hours: float, out: Path) -> str:

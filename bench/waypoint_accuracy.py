@@ -14,7 +14,7 @@ from math import dist
 from typing import NamedTuple
 
 from volery.base.time import from_seconds
-from volery.control.actuation import Command, Measured
+from volery.control.actuation import MeasuredState, MotionCommand
 from volery.control.flight import PERIOD, ControlledFlight
 from volery.control.manoeuvres import LoopSample, Waypoints, cube
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
@@ -47,7 +47,7 @@ class _Observed(Waypoints):
         self._recent: list[Distances] = []
         self.look = lambda goal: Distances(0.0, 0.0, 0.0)
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Fly on, and note the distances of a corner that was held."""
         at = len(self.corners)
         result = super().step(measured, sample_s)

@@ -62,6 +62,14 @@ VARIANTS = (
 """Packages whose sub-packages are variants of one thing (one per firmware, client library, ROS version): a
 module is named with its sub-package there. Modules of `cli` are named after their command."""
 
+PRESCRIBED = (
+    "ros/client_libraries",
+    "components/virtual_stdlib",
+    "calibration/ros/probes",
+    "calibration/timed_programs.py",
+)
+"""Where names of classes are those of a library that is stood in for, or programs that nothing imports."""
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]', re.MULTILINE)
 
 
@@ -129,6 +137,20 @@ def file_names() -> Iterator[str]:
     for name, paths in sorted(named.items()):
         if len(paths) > 1:
             yield f"{name} names different things: {', '.join(sorted(paths))}"
+
+
+def class_names() -> Iterator[str]:
+    """Yield names that several classes share."""
+    named = defaultdict(list)
+    for path in tracked("src"):
+        name = str(path.relative_to(PACKAGE))
+        if path.suffix == ".py" and not name.startswith(PRESCRIBED):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    named[node.name].append(f"{name}:{node.lineno}")
+    for name, places in sorted(named.items()):
+        if len(places) > 1:
+            yield f"class {name} has several meanings: {', '.join(places)}"
 
 
 def words() -> Iterator[str]:

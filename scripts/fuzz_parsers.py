@@ -41,17 +41,17 @@ with atheris.instrument_imports(include=INSTRUMENTED):
     from volery.links.tlog import read_tlog
     from volery.model.reading import Vocabulary
     from volery.model.system_loader import load
-    from volery.ros.messages import Message, new
+    from volery.ros.messages import RosMessage, new
     from volery.ros.messages.bags import create_bag, open_bag
     from volery.ros.messages.encodings import from_cdr, from_ros1, to_cdr, to_ros1
     from volery.ros.messages.store import idl_fields, interface_messages
     from volery.testing.fuzzing import SEALS
     from volery.testing.sample_run import sample_events, sample_setup
     from volery.trace.attachments import SETUP_ATTACHMENT, ComponentSetup, RunSetup, to_json
-    from volery.trace.encoding import Codec, type_name
+    from volery.trace.encoding import EventCodec, type_name
     from volery.trace.events import Published
     from volery.trace.mcap_writer import TRACE_SCHEMA, McapWriter
-    from volery.trace.reader import Reading
+    from volery.trace.reader import OpenTrace
     from volery.vehicles import address
 
 ROOT = Path(__file__).parent.parent
@@ -134,7 +134,7 @@ def _quantity(data: bytes) -> None:
 
 
 def _trace(path: Path) -> None:
-    with Reading(path) as reading:
+    with OpenTrace(path) as reading:
         for _ in islice(reading.events(), MESSAGES):
             pass
 
@@ -170,9 +170,9 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
 }
 
 
-def _filled(name: str) -> Message:
+def _filled(name: str) -> RosMessage:
     """Return a message with one element in each of its lists."""
-    message: Message = new(name)
+    message: RosMessage = new(name)
     for label, kind in idl_fields(name).items():
         if kind.startswith("sequence<") and "/" in kind:
             setattr(message, label, [new(kind[9:-1])])
@@ -213,7 +213,7 @@ def _written_trace() -> list[bytes]:
             seen.add(kind)
             number = plain.register_schema(type_name(kind), "ros2msg", b"")
             channel = plain.register_channel(kind.__name__, "cdr", number)
-            plain.add_message(channel, 0, Codec(kind).encode(event), 0)
+            plain.add_message(channel, 0, EventCodec(kind).encode(event), 0)
     own.close()
     plain.finish()
     return [path.read_bytes(), short.getvalue()]

@@ -6,7 +6,7 @@ from itertools import combinations
 from math import dist, inf, nan
 
 from volery.base.time import Ns, to_seconds
-from volery.requirements.added_observables import AddedObservables, Quantity
+from volery.requirements.added_observables import AddedObservables, ObservedQuantity
 from volery.requirements.record import TableRecord
 from volery.trace.attachments import RunSetup
 from volery.trace.events import VehicleState
@@ -19,7 +19,7 @@ class Separation(AddedObservables):
     """Distances between the centres of vehicles, at each state of either while both are in the air."""
 
     subject = "vehicle"
-    quantities = (Quantity("separation_min", "m", "least distance to another vehicle in the air"),)
+    quantities = (ObservedQuantity("separation_min", "m", "least distance to another vehicle in the air"),)
     listens = (VehicleState,)
 
     def __init__(self, setup: RunSetup) -> None:

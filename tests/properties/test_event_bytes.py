@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.trace.encoding import OWN_EVENTS, Codec, _annotation
+from volery.trace.encoding import OWN_EVENTS, EventCodec, _annotation
 
 _VALUES: dict[str, st.SearchStrategy[Any]] = {
     "Ns": st.integers(-(2**63), 2**63 - 1),
@@ -15,7 +15,7 @@ _VALUES: dict[str, st.SearchStrategy[Any]] = {
     "bool": st.booleans(),
     "str": st.text(st.characters(exclude_categories=("Cs",)), max_size=40),
 }
-_CODECS = {kind: Codec(kind) for kind in OWN_EVENTS}
+_CODECS = {kind: EventCodec(kind) for kind in OWN_EVENTS}
 
 
 def events(kind: type[Any]) -> st.SearchStrategy[Any]:

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from volery.links.frame import Frame
 from volery.links.pprzlink_codec import PprzlinkParser, encode, quantised
-from volery.links.pprzlink_messages import Field, message_names, message_type
+from volery.links.pprzlink_messages import PayloadField, message_names, message_type
 
 INTEGERS = {"b": (-128, 127), "B": (0, 255), "h": (-(2**15), 2**15 - 1), "H": (0, 2**16 - 1)}
 INTEGERS |= {"i": (-(2**31), 2**31 - 1), "I": (0, 2**32 - 1)}
 TEXT = st.text(alphabet=st.characters(min_codepoint=1, max_codepoint=126), max_size=120)
 
 
-def values(field: Field) -> st.SearchStrategy[Any]:
+def values(field: PayloadField) -> st.SearchStrategy[Any]:
     if field.text:
         return TEXT
     if field.code in INTEGERS:

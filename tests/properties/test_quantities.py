@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from volery.base.errors import Location, VoleryError
 from volery.base.units import PLAIN, TIME, UNITS, QuantityError, parse, read, read_ns, unit
 from volery.model.assembly import Change, apply_changes, change_from_option, split_path
-from volery.model.text import Node, Problems, parse_value
+from volery.model.text import Problems, TextNode, parse_value
 from volery.model.text import parse as parse_text
 
 SYMBOLS = st.sampled_from(sorted(UNITS))
@@ -64,10 +64,10 @@ VALUES = st.recursive(
 
 def tree(value):
     if isinstance(value, dict):
-        return Node({key: tree(inner) for key, inner in value.items()}, HERE)
+        return TextNode({key: tree(inner) for key, inner in value.items()}, HERE)
     if isinstance(value, list):
-        return Node([tree(inner) for inner in value], HERE)
-    return Node(value, HERE)
+        return TextNode([tree(inner) for inner in value], HERE)
+    return TextNode(value, HERE)
 
 
 @given(NAMES, NAMES, VALUES, VALUES)

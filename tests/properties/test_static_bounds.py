@@ -20,7 +20,7 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import current_task, end_activation
-from volery.requirements.response_bounds import Demand, response_bounds
+from volery.requirements.response_bounds import TaskDemand, response_bounds
 from volery.trace.events import Activation
 
 ACTIVATIONS = 15
@@ -70,7 +70,7 @@ def longest_responses(tasks, costs, scheduler, switch):
 
 def bounds_of(tasks, costs, scheduler, switch):
     demands = [
-        Demand.periodic(str(number), -number, cost + 2 * switch, task["period"] * MS, task["jitter"] * MS)
+        TaskDemand.periodic(str(number), -number, cost + 2 * switch, task["period"] * MS, task["jitter"] * MS)
         for number, (task, cost) in enumerate(zip(tasks, costs, strict=True))
     ]
     if scheduler == "fixed-priority":
@@ -107,7 +107,7 @@ def test_the_bound_of_any_callback_covers_executors_in_order_of_arrival(tasks):
     """The default executor's bound of subscriptions assumes no order among those that wait."""
     costs = [task["period"] * MS * task["share"] // 100 for task in tasks]
     callbacks = [
-        Callback(Demand.periodic(str(number), 0, cost, task["period"] * MS, task["jitter"] * MS))
+        Callback(TaskDemand.periodic(str(number), 0, cost, task["period"] * MS, task["jitter"] * MS))
         for number, (task, cost) in enumerate(zip(tasks, costs, strict=True))
     ]
     bounds = executor_bounds(callbacks, Dedicated())

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 from volery.simulation.world.environment_models import Wind
 
 HERE = LocalFrame(47.4, 8.5, 400.0)
@@ -30,7 +30,7 @@ drives = st.lists(
 def flown(drives, looks):
     """Bytes of everything after a schedule of set-points, seen at the moments of *looks* besides the end."""
     now = 0
-    specs = [Multirotor(), Rover(at=(10.0, 0.0, 0.0))]
+    specs = [Multirotor(), WheeledRover(at=(10.0, 0.0, 0.0))]
     world, flights = make_world(lambda: now, specs, seed=5, frame=HERE, wind=Wind(east=2.0, gust=0.5))
     schedule = [(moment, 0, body, (control, goal)) for moment, body, control, goal in drives]
     schedule += [(moment, 1, body, deep) for moment, body, deep in looks]

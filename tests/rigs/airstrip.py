@@ -17,7 +17,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.links.link import Link
 from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 from volery.trace.events import Operation
 from volery.vehicles import Drone, Vehicle
 
@@ -50,7 +50,7 @@ class Airstrip:
     ) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
-        body = Multirotor() if kind is Drone else Rover()
+        body = Multirotor() if kind is Drone else WheeledRover()
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
         firmware = dialects.load(self.firmware).of_version(self.version)
         self.autopilot = firmware.create(

@@ -9,7 +9,7 @@ from typing import Any
 from volery.base.errors import VoleryError
 from volery.base.time import MS, S, from_seconds
 from volery.control.flight import ControlledFlight
-from volery.control.manoeuvres import Manoeuvre
+from volery.control.manoeuvres import LawManoeuvre
 from volery.control.safety_switch import SwitchSettings
 from volery.kernel.waiting import sleep
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
@@ -59,7 +59,7 @@ class Watched:
 
 
 def fly_watched(
-    make: Callable[[], Manoeuvre],
+    make: Callable[[], LawManoeuvre],
     moves: Sequence[tuple[float, int]] = (),
     *,
     by: str = "setpoints",

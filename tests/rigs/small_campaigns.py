@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from volery.explore.executors import executors
-from volery.explore.points import Row
+from volery.explore.points import CampaignRow
 
 MODEL = """
 volery: 1
@@ -93,7 +93,7 @@ class StubEngine(Executor):
         observables = {"drone_1.energy": 1000.0 + seconds, "drone_1.distance": seconds}
         verdicts = {"in_time": seconds < 90.0, "counted": True}
         future.set_result(
-            Row(
+            CampaignRow(
                 task.run,
                 task.point,
                 "completed",

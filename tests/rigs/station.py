@@ -14,7 +14,7 @@ from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 from volery.trace.events import Record, ignore
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -58,7 +58,7 @@ class Station:
         **options: Any,
     ) -> None:
         self.kernel = VirtualKernel(self.record)
-        body = Multirotor if kind == "copter" else Rover
+        body = Multirotor if kind == "copter" else WheeledRover
         spec = body(sensors=sensors, heading_deg=self.heading)
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=seed, frame=self.home)
         firmware = self.firmware.with_features(features or self.features)

@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image, Imu
 import volery
 from volery import AMSL, Position, VoleryError
 from volery.autonomy.markers import MarkerFinder, camera_of, picture_of
-from volery.autonomy.precision_landing import Landing, LandingRules, Phase, sight_of, step
+from volery.autonomy.precision_landing import LandingPhase, LandingRules, LandingState, sight_of, step
 
 SEEN_FROM_M = 8.0
 """From higher up it descends by position: a marker has too few pixels there."""
@@ -68,17 +68,17 @@ class CameraLanding(PrecisionLanding):
         Raises:
             VoleryError: The landing was aborted.
         """
-        landing, rate = Landing(), rospy.Rate(10)
+        landing, rate = LandingState(), rospy.Rate(10)
         while not rospy.is_shutdown() and self._drone.flying:
             sight = self._look()
             north, east, up = self._drone.velocity
             now = rospy.Time.now().to_nsec()
             landing, command = step(landing, self._rules, now, (east, north, up), sight)
-            if landing.phase is Phase.LAND:
+            if landing.phase is LandingPhase.LAND:
                 return
             east, north, up = command.velocity
             self._drone.set_velocity(north, east, up)
-            if landing.phase is Phase.ABORT:
+            if landing.phase is LandingPhase.ABORT:
                 volery.log(f"no landing on the marker: {landing.reason}", "warning")
                 raise VoleryError(f"no landing on the marker: {landing.reason}")
             rate.sleep()

@@ -13,7 +13,7 @@ from sensor_msgs.msg import CameraInfo, Image, Imu
 import volery
 from volery import AMSL, Position, VoleryError
 from volery.autonomy.markers import MarkerFinder, camera_of, picture_of
-from volery.autonomy.precision_landing import Landing, LandingRules, Phase, sight_of, step
+from volery.autonomy.precision_landing import LandingPhase, LandingRules, LandingState, sight_of, step
 
 ROUND_S = 0.05
 ATTITUDE, ATTITUDE_HZ = 30, 20
@@ -69,7 +69,7 @@ class MarkerLanding:
 
     def _descend(self):
         """Down to where the autopilot can land alone. Why it did not come there, or nothing."""
-        landing, rate = Landing(), rospy.Rate(1.0 / ROUND_S)
+        landing, rate = LandingState(), rospy.Rate(1.0 / ROUND_S)
         while not rospy.is_shutdown():
             sight = self._look()
             north, east, up = self._drone.velocity
@@ -78,9 +78,9 @@ class MarkerLanding:
             landing, command = step(landing, self._rules, now, (east, north, up), sight)
             if landing.phase is not before:
                 volery.log(f"{landing.phase.value}: the marker is {_words(landing.offset)}")
-            if landing.phase is Phase.LAND:
+            if landing.phase is LandingPhase.LAND:
                 return ""
-            if landing.phase is Phase.ABORT:
+            if landing.phase is LandingPhase.ABORT:
                 return landing.reason
             east, north, up = command.velocity
             self._drone.set_velocity(north, east, up)

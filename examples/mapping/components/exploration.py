@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 import volery
 from volery.autonomy.avoidance import Motion
-from volery.autonomy.explorer import Command, Explorer
+from volery.autonomy.explorer import ExplorationCommand, Explorer
 from volery.autonomy.laser_scan import scan_of
 from volery.autonomy.planar_pose import Pose2
 from volery.base.frames import quaternion_to_euler
@@ -94,7 +94,7 @@ class Exploration:
         velocity = np.array((cos(turn) * east + sin(turn) * north, cos(turn) * north - sin(turn) * east))
         navigator, now = self._explorer.navigator, rospy.Time.now().to_nsec()
         if self._explorer.done:  # home
-            command = Command(navigator.update(now, pose, self._seen, velocity), 0.0)
+            command = ExplorationCommand(navigator.update(now, pose, self._seen, velocity), 0.0)
         else:
             command = self._explorer.update(now, pose, self._seen, velocity)
         word = navigator.word

@@ -14,7 +14,7 @@ from volery.analysis.system_analysis import Utilisation
 from volery.base.errors import EstimateError
 from volery.base.time import to_seconds
 from volery.cost import ProcessorPrices, load_catalogue
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.model.instances import Instance
 from volery.model.system import System
 from volery.run.assembly.bodies import body_of
@@ -79,14 +79,20 @@ class Budgets:
 def budgets(system: System, utilisations: Sequence[Utilisation]) -> Budgets:
     """Return the budgets of *system*, whose processors have these static *utilisations*."""
     catalogue = load_catalogue(*system.catalogues)
-    shares = {one.resource: one for one in utilisations}
+    shares = {utilisation.resource: utilisation for utilisation in utilisations}
     energy = tuple(
-        _energy(system, ProcessorPrices(one.name, catalogue.processor(one.kind), one.frequency_hz),
-                shares[one.name], one.cores)
-        for one in system.processors
-    )  # fmt: skip
+        _energy(
+            system,
+            ProcessorPrices(processor.name, catalogue.processor(processor.kind), processor.frequency_hz),
+            shares[processor.name],
+            processor.cores,
+        )
+        for processor in system.processors
+    )
     return Budgets(
-        tuple(memory(system)), energy, tuple(_endurance(system, one, energy) for one in system.vehicles)
+        tuple(memory(system)),
+        energy,
+        tuple(_endurance(system, vehicle, energy) for vehicle in system.vehicles),
     )
 
 
@@ -95,11 +101,11 @@ def memory(system: System) -> Iterator[Memory]:
 
     The instances of a memory space share its process; every other instance is deployed as one.
     """
-    limits = {one.name: one.memory_b for one in system.memory_spaces}
+    limits = {space.name: space.memory_b for space in system.memory_spaces}
     used: dict[str, list[Memory]] = {}
     for process, instances in _processes(system).items():
-        missing = [one.component.name for one in instances if one.component.memory_b is None]
-        stated, limit = sum(one.component.memory_b or 0.0 for one in instances), limits.get(process)
+        missing = [instance.component.name for instance in instances if instance.component.memory_b is None]
+        stated, limit = sum(instance.component.memory_b or 0.0 for instance in instances), limits.get(process)
         why = f"state `memory` of {', '.join(dict.fromkeys(missing))}" if missing else ""
         if limit is not None and stated > limit:
             why = f"more than the {limit:g} B of its memory space"
@@ -120,9 +126,9 @@ def memory(system: System) -> Iterator[Memory]:
 
 def _processes(system: System) -> dict[str, list[Instance]]:
     found: dict[str, list[Instance]] = {}
-    for one in system.instances:
-        if one.processor is not None:
-            found.setdefault(one.memory_space or one.name, []).append(one)
+    for instance in system.instances:
+        if instance.processor is not None:
+            found.setdefault(instance.memory_space or instance.name, []).append(instance)
     return found
 
 
@@ -143,19 +149,23 @@ def _energy(system: System, prices: ProcessorPrices, used: Utilisation, cores: i
     )
 
 
-def _reserve(system: System, vehicle: Vehicle) -> float:
+def _reserve(system: System, vehicle: VehicleSpec) -> float:
     """Return the share of the charge that a requirement wants to be left; 0 without one."""
     wanted = f"{vehicle.name}.{RESERVE_OBSERVABLE}"
-    bounds = (one.bound for one in system.requirements if (one.observe, one.relation) == (wanted, "min"))
+    bounds = (
+        requirement.bound
+        for requirement in system.requirements
+        if (requirement.observe, requirement.relation) == (wanted, "min")
+    )
     return max(bounds, default=0.0)
 
 
-def _endurance(system: System, vehicle: Vehicle, energy: Sequence[Energy]) -> Endurance:
+def _endurance(system: System, vehicle: VehicleSpec, energy: Sequence[Energy]) -> Endurance:
     body, reserve = body_of(vehicle), _reserve(system, vehicle)
     if not isinstance(body, Multirotor):
         why = "the power of a rover depends on its way; simulate it"
         return Endurance(vehicle.name, None, None, reserve, None, why)
-    fed = [one.name for one in system.processors if one.powered_by == vehicle.name]
+    fed = [processor.name for processor in system.processors if processor.powered_by == vehicle.name]
     drawn = [one.greatest_watts for one in energy if one.processor in fed]
     if None in drawn:
         return Endurance(vehicle.name, None, None, reserve, None, f"no power figures for {', '.join(fed)}")

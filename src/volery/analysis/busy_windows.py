@@ -11,7 +11,7 @@ is enough to examine the offsets within it at which the demand of the task under
 * rclcpp's default executor, which takes timers first and samples all others at polling points: Casini et al.,
   *Response-Time Analysis of ROS 2 Processing Chains under Reservation-Based Scheduling*, ECRTS 2019.
 
-A demand is a ``Demand``: the most that n activations execute and the least time that n releases span.
+A demand is a ``TaskDemand``: the most that n activations execute and the least time that n releases span.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from volery.base.time import Ns
-from volery.requirements.response_bounds import Demand, ManyCores, OneCore
+from volery.requirements.response_bounds import ManyCores, OneCore, TaskDemand
 
 MOST_ITERATIONS = 20_000
 """A search ends without a bound after so many steps: the processor is full, or nearly."""
@@ -31,17 +31,17 @@ _INSTANT: Ns = 1
 """The length of a closed window [A, A]."""
 
 
-def requested(demand: Demand, window: Ns) -> Ns:
+def requested(demand: TaskDemand, window: Ns) -> Ns:
     """Return the most execution time that is released in any half-open *window*, ns."""
     return demand.cost(demand.released_within(window))
 
 
-def requested_by_all(demands: Iterable[Demand], window: Ns) -> Ns:
+def requested_by_all(demands: Iterable[TaskDemand], window: Ns) -> Ns:
     """Return the most execution time of all *demands* that is released in any half-open *window*, ns."""
-    return sum(requested(one, window) for one in demands)
+    return sum(requested(demand, window) for demand in demands)
 
 
-def rate(demand: Demand) -> float:
+def rate(demand: TaskDemand) -> float:
     """Return the long-term share of one core that *demand* takes."""
     return demand.costs[-1] / len(demand.costs) * len(demand.spans) / demand.spans[-1]
 
@@ -49,7 +49,7 @@ def rate(demand: Demand) -> float:
 # -- what a processor serves
 
 
-class Supply(Protocol):
+class LeastSupply(Protocol):
     """What a flow of control gets of a core, at least."""
 
     def time_for(self, service: Ns) -> Ns | None:
@@ -60,7 +60,7 @@ class Dedicated:
     """A core of its own."""
 
     def time_for(self, service: Ns) -> Ns | None:
-        """See ``Supply``."""
+        """See ``LeastSupply``."""
         return service
 
 
@@ -72,7 +72,7 @@ class PeriodicReservation:
     budget: Ns
 
     def time_for(self, service: Ns) -> Ns | None:
-        """See ``Supply``."""
+        """See ``LeastSupply``."""
         if service <= 0:
             return 0
         whole, rest = divmod(service - 1, self.budget)
@@ -87,7 +87,7 @@ class LeftOver:
     others: OneCore | ManyCores
 
     def time_for(self, service: Ns) -> Ns | None:
-        """See ``Supply``."""
+        """See ``LeastSupply``."""
         return _least(service, lambda window: service + self.others.interference(window, service))
 
 
@@ -109,7 +109,7 @@ def _least(start: Ns, right_side: Callable[[Ns], Ns | None]) -> Ns | None:
 class DeadlineTask:
     """A task under EDF; *deadline* is relative to its release, ns."""
 
-    demand: Demand
+    demand: TaskDemand
     deadline: Ns
 
 
@@ -118,9 +118,9 @@ def edf_bounds(tasks: Sequence[DeadlineTask]) -> dict[str, Ns | None]:
 
     Ties of deadlines are taken as lost by the task under analysis.
     """
-    everything = [one.demand for one in tasks]
+    everything = [task.demand for task in tasks]
     busy = _busy_window(everything, Dedicated())
-    return {one.demand.name: None if busy is None else _edf_bound(one, tasks, busy) for one in tasks}
+    return {task.demand.name: None if busy is None else _edf_bound(task, tasks, busy) for task in tasks}
 
 
 def _edf_bound(task: DeadlineTask, tasks: Sequence[DeadlineTask], busy: Ns) -> Ns | None:
@@ -132,9 +132,9 @@ def _edf_bound(task: DeadlineTask, tasks: Sequence[DeadlineTask], busy: Ns) -> N
     if len(offsets) > MOST_OFFSETS:
         return None
     longest = 0
-    for offset in sorted(one for one in offsets if one < busy):
+    for offset in sorted(offset for offset in offsets if offset < busy):
         own = requested(task.demand, offset + _INSTANT)
-        until = [(one.demand, offset + _INSTANT + task.deadline - one.deadline) for one in others]
+        until = [(other.demand, offset + _INSTANT + task.deadline - other.deadline) for other in others]
         end = _least(
             own,
             lambda window, own=own, until=until: (  # type: ignore[misc]  # defaults bind the loop's values
@@ -147,24 +147,24 @@ def _edf_bound(task: DeadlineTask, tasks: Sequence[DeadlineTask], busy: Ns) -> N
     return longest
 
 
-def fifo_bound(demands: Sequence[Demand]) -> Ns | None:
+def fifo_bound(demands: Sequence[TaskDemand]) -> Ns | None:
     """Return the response-time bound that all *demands* share on one core in order of release."""
     busy = _busy_window(demands, Dedicated())
     if busy is None:
         return None
-    offsets = {at for one in demands for at in _steps(one, busy)}
+    offsets = {at for demand in demands for at in _steps(demand, busy)}
     if len(offsets) > MOST_OFFSETS:
         return None
     return max((requested_by_all(demands, at + _INSTANT) - at for at in offsets), default=0)
 
 
-def _busy_window(demands: Sequence[Demand], supply: Supply, more: Ns = 0) -> Ns | None:
+def _busy_window(demands: Sequence[TaskDemand], supply: LeastSupply, more: Ns = 0) -> Ns | None:
     if sum(map(rate, demands)) > 1.0:
         return None
     return _least(_INSTANT, lambda window: supply.time_for(more + requested_by_all(demands, window)))
 
 
-def _steps(demand: Demand, until: Ns) -> Iterator[Ns]:
+def _steps(demand: TaskDemand, until: Ns) -> Iterator[Ns]:
     """Yield the offsets below *until* at which one more activation may be released."""
     for releases in range(MOST_OFFSETS + 1):
         at = demand.span(releases)
@@ -180,11 +180,11 @@ def _steps(demand: Demand, until: Ns) -> Iterator[Ns]:
 class Callback:
     """A callback of an executor: its demand, and whether it is a timer's. Earlier timers come first."""
 
-    demand: Demand
+    demand: TaskDemand
     timer: bool = False
 
 
-def executor_bounds(callbacks: Sequence[Callback], supply: Supply) -> dict[str, Ns | None]:
+def executor_bounds(callbacks: Sequence[Callback], supply: LeastSupply) -> dict[str, Ns | None]:
     """Return the response-time bounds of callbacks of one single-threaded executor of rclcpp.
 
     A timer waits for one other callback that has begun, and for the timers that were created before it; any
@@ -192,20 +192,26 @@ def executor_bounds(callbacks: Sequence[Callback], supply: Supply) -> dict[str, 
     never wait are assumed.
     """
     bounds: dict[str, Ns | None] = {}
-    urgent: list[Demand] = []
-    for one in callbacks:
-        others = [each.demand for each in callbacks if each is not one]
-        if one.timer:
+    urgent: list[TaskDemand] = []
+    for callback in callbacks:
+        others = [each.demand for each in callbacks if each is not callback]
+        if callback.timer:
             rest = [other.cost(1) for other in others if other not in urgent]
-            bounds[one.demand.name] = callback_bound(one.demand, urgent, supply, max(rest, default=0))
-            urgent.append(one.demand)
+            bounds[callback.demand.name] = callback_bound(
+                callback.demand, urgent, supply, max(rest, default=0)
+            )
+            urgent.append(callback.demand)
         else:
-            bounds[one.demand.name] = callback_bound(one.demand, others, supply)
+            bounds[callback.demand.name] = callback_bound(callback.demand, others, supply)
     return bounds
 
 
 def callback_bound(
-    own: Demand, before: Sequence[Demand], supply: Supply, blocking: Ns = 0, steps: Demand | None = None
+    own: TaskDemand,
+    before: Sequence[TaskDemand],
+    supply: LeastSupply,
+    blocking: Ns = 0,
+    steps: TaskDemand | None = None,
 ) -> Ns | None:
     """Return the response-time bound of a callback that is not preempted within its executor.
 

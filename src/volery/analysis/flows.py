@@ -1,8 +1,8 @@
 """The flows of control of a model: what each activation and callback costs, how often it is released.
 
-What the model leaves open is an ``Unknown`` with the reason and the remedy; it makes every bound impossible
-that it could break, and no other. Costs are those of fidelity ``times``: stated figures, scaled to the
-frequency of the processor, and the prices of ROS calls.
+What the model leaves open is an ``UnboundedExecution`` with the reason and the remedy; it makes every bound
+impossible that it could break, and no other. Costs are those of fidelity ``times``: stated figures, scaled
+to the frequency of the processor, and the prices of ROS calls.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from volery.analysis.vehicle_cycles import cycle_of
 from volery.base.errors import EstimateError
 from volery.base.time import US, Ns, S
 from volery.cost import Price, ProcessorPrices, StatedCost, StatedPricing, Tariff, load_catalogue
-from volery.model.components import ACTIVATION, Figure
-from volery.model.environment import Vehicle
-from volery.model.instances import Instance, Target, TargetKind
+from volery.model.components import ACTIVATION, StatedFigure
+from volery.model.environment import VehicleSpec
+from volery.model.instances import ConnectionTarget, Instance, TargetKind
 from volery.model.system import System
-from volery.requirements.response_bounds import Demand
+from volery.requirements.response_bounds import TaskDemand
 from volery.ros.graph.interface import absolute_name, absolute_remaps
 from volery.run.assembly.computers import (
     LOAD_PERIOD,
@@ -37,7 +37,7 @@ VEHICLE_NODE_PRIORITY = 0
 
 
 @dataclass(frozen=True)
-class Flow:
+class ActivationFlow:
     """A sequence of activations with one release pattern.
 
     ``thread`` is the same for callbacks of one executor. ``cost`` includes context switches; ``background``
@@ -67,18 +67,18 @@ class Flow:
         """The share of one core that it takes in the long term."""
         return (self.cost + self.background) / self.period
 
-    def demand(self) -> Demand:
+    def demand(self) -> TaskDemand:
         """Return its demand; its background counts as its own, and so does waiting.
 
         What waits is taken as what executes (suspension-oblivious analysis: Liu, *Real-Time Systems*, 2000).
         """
         cost = self.cost + self.background + self.waits
-        made = Demand.periodic(self.name, self.priority, cost, self.period, self.jitter)
+        made = TaskDemand.periodic(self.name, self.priority, cost, self.period, self.jitter)
         return replace(made, least_priority=self.least_priority)
 
 
 @dataclass(frozen=True)
-class Unknown:
+class UnboundedExecution:
     """Execution on a processor that the model does not state: up to ``priority``, for the reason ``why``.
 
     ``least_share`` of a core is stated all the same.
@@ -92,7 +92,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Stream:
+class MessageStream:
     """Messages that one flow publishes on a topic. ``jitter`` is against the period of its source."""
 
     topic: str
@@ -134,10 +134,10 @@ class _Cost:
 def _greatest(costs: Sequence[_Cost]) -> _Cost:
     """Return a cost that none of *costs* exceeds in any part."""
     return _Cost(
-        max(one.time for one in costs),
-        max(one.background for one in costs),
-        max(one.pieces for one in costs),
-        min(one.least_priority for one in costs),
+        max(cost.time for cost in costs),
+        max(cost.background for cost in costs),
+        max(cost.pieces for cost in costs),
+        min(cost.least_priority for cost in costs),
     )
 
 
@@ -145,11 +145,11 @@ def _greatest(costs: Sequence[_Cost]) -> _Cost:
 class Flows:
     """All that executes on the processors of a system, and the streams of messages between."""
 
-    known: tuple[Flow, ...]
-    unknown: tuple[Unknown, ...]
-    streams: tuple[Stream, ...]
+    known: tuple[ActivationFlow, ...]
+    unknown: tuple[UnboundedExecution, ...]
+    streams: tuple[MessageStream, ...]
 
-    def on(self, processor: str) -> tuple[list[Flow], list[Unknown]]:
+    def on(self, processor: str) -> tuple[list[ActivationFlow], list[UnboundedExecution]]:
         """Return what executes on *processor*."""
         return (
             [one for one in self.known if one.processor == processor],
@@ -164,13 +164,16 @@ class FlowReader:
         self.system = system
         catalogue = load_catalogue(*system.catalogues)
         self.prices = {
-            one.name: ProcessorPrices(one.name, catalogue.processor(one.kind), one.frequency_hz)
-            for one in system.processors
+            processor.name: ProcessorPrices(
+                processor.name, catalogue.processor(processor.kind), processor.frequency_hz
+            )
+            for processor in system.processors
         }
-        self._processors = {one.name: one for one in system.processors}
-        self._instances = {one.name: one for one in system.instances}
+        self._processors = {processor.name: processor for processor in system.processors}
+        self._instances = {instance.name: instance for instance in system.instances}
         self._names = {
-            one.name: absolute_remaps(one.remap, one.namespace, one.name) for one in system.instances
+            instance.name: absolute_remaps(instance.remap, instance.namespace, instance.name)
+            for instance in system.instances
         }
         self._subscribed: dict[str, list[Instance]] = {}
         self._callers: dict[str, list[Instance]] = {}
@@ -198,9 +201,9 @@ class FlowReader:
             responses: Response-time bound of each flow so far, ns; the jitter of what it publishes.
             delays: Bound of the delay of a topic to a processor on the network, ns.
         """
-        known: list[Flow] = []
-        unknown: list[Unknown] = []
-        streams: list[Stream] = []
+        known: list[ActivationFlow] = []
+        unknown: list[UnboundedExecution] = []
+        streams: list[MessageStream] = []
         for instance in self._in_order():
             if instance.processor is None:
                 streams += self._from_environment(instance)
@@ -210,11 +213,11 @@ class FlowReader:
             unknown += problems
             streams += [made for one in mine for made in self._published(instance, one, responses)]
         for one in self._called_from_elsewhere():
-            (known if isinstance(one, Flow) else unknown).append(one)  # type: ignore[arg-type]
+            (known if isinstance(one, ActivationFlow) else unknown).append(one)  # type: ignore[arg-type]
         for vehicle in self.system.vehicles:
             if vehicle.processor is not None:
                 made = self._vehicle_node(vehicle, vehicle.processor)
-                (known if isinstance(made, Flow) else unknown).append(made)  # type: ignore[arg-type]
+                (known if isinstance(made, ActivationFlow) else unknown).append(made)  # type: ignore[arg-type]
         known += self._background_loads()
         return Flows(tuple(known), tuple(unknown), tuple(streams))
 
@@ -239,20 +242,23 @@ class FlowReader:
     # -- one instance
 
     def _flows_of(
-        self, instance: Instance, streams: Sequence[Stream], delays: Mapping[tuple[str, str], Ns | None]
-    ) -> tuple[list[Flow], list[Unknown]]:
+        self,
+        instance: Instance,
+        streams: Sequence[MessageStream],
+        delays: Mapping[tuple[str, str], Ns | None],
+    ) -> tuple[list[ActivationFlow], list[UnboundedExecution]]:
         component, activity, processor = instance.component, instance.activity, instance.processor or ""
         priority = activity.priority if activity else 0
         if activity is None and not component.subscribes:
             return [], []
-        found: list[Flow] = []
-        problems: list[Unknown] = []
+        found: list[ActivationFlow] = []
+        problems: list[UnboundedExecution] = []
 
         def refuse(why: str) -> None:
             reached = (one.activity for one in self._reached(instance, processor))
             urgent = [priority, *(one.priority for one in reached if one is not None)]
             share = self._stated_share(instance)
-            problems.append(Unknown(instance.name, processor, max(urgent), why, share))
+            problems.append(UnboundedExecution(instance.name, processor, max(urgent), why, share))
 
         serial = component.language in EXECUTOR_LANGUAGES
         thread = instance.name if serial else ""
@@ -261,11 +267,22 @@ class FlowReader:
             if activity is not None and period is not None:
                 cost = self._cost(instance, "")
                 found.append(
-                    Flow(instance.name, instance.name, processor, thread or instance.name, priority,
-                         cost.least_priority, cost.time, period, cost.background,
-                         activity.jitter_ns, activity.deadline_ns, cost.pieces,
-                         waits=component.assume.waits_ns or 0)
-                )  # fmt: skip
+                    ActivationFlow(
+                        instance.name,
+                        instance.name,
+                        processor,
+                        thread or instance.name,
+                        priority,
+                        cost.least_priority,
+                        cost.time,
+                        period,
+                        cost.background,
+                        activity.jitter_ns,
+                        activity.deadline_ns,
+                        cost.pieces,
+                        waits=component.assume.waits_ns or 0,
+                    )
+                )
             elif activity is not None and not component.subscribes:
                 refuse(
                     "it is active without a period: state `active: {period: ...}`, or what is assumed of its "
@@ -291,13 +308,13 @@ class FlowReader:
         self,
         instance: Instance,
         name: str,
-        streams: Sequence[Stream],
+        streams: Sequence[MessageStream],
         delays: Mapping[tuple[str, str], Ns | None],
-    ) -> Iterator[Flow]:
+    ) -> Iterator[ActivationFlow]:
         topic, processor = self.topic(instance, name), instance.processor or ""
         activity = instance.activity
         priority = activity.priority if activity else 0
-        arriving = [one for one in streams if one.topic == topic]
+        arriving = [stream for stream in streams if stream.topic == topic]
         if not arriving:
             raise _NotStatedError(
                 f"no flow with a known period publishes {topic} in this model: state its publisher and period"
@@ -311,31 +328,58 @@ class FlowReader:
             deadline = activity.deadline_ns if activity else None
             thread = instance.name if instance.component.language in EXECUTOR_LANGUAGES else label
             jitter = stream.jitter + delay
-            yield Flow(label, instance.name, processor, thread, priority, cost.least_priority, cost.time,
-                       stream.period, cost.background, jitter, deadline, cost.pieces, topic,
-                       waits=instance.component.assume.waits_ns or 0)  # fmt: skip
+            yield ActivationFlow(
+                label,
+                instance.name,
+                processor,
+                thread,
+                priority,
+                cost.least_priority,
+                cost.time,
+                stream.period,
+                cost.background,
+                jitter,
+                deadline,
+                cost.pieces,
+                topic,
+                waits=instance.component.assume.waits_ns or 0,
+            )
 
     def _published(
-        self, instance: Instance, flow: Flow, responses: Mapping[str, Ns | None]
-    ) -> Iterator[Stream]:
+        self, instance: Instance, flow: ActivationFlow, responses: Mapping[str, Ns | None]
+    ) -> Iterator[MessageStream]:
         response = responses.get(flow.name, 0)
         if response is None:
             return
-        for one in instance.component.publishes.values():
-            trigger = self.topic(instance, one.on) if one.on else ""
+        for publish in instance.component.publishes.values():
+            trigger = self.topic(instance, publish.on) if publish.on else ""
             if trigger == flow.topic:
-                made = Stream(self.topic(instance, one.name), instance.name, flow.processor, flow.name,
-                              flow.period, flow.jitter + response, one.size_b)  # fmt: skip
-                yield from [made] * one.count
+                stream = MessageStream(
+                    self.topic(instance, publish.name),
+                    instance.name,
+                    flow.processor,
+                    flow.name,
+                    flow.period,
+                    flow.jitter + response,
+                    publish.size_b,
+                )
+                yield from [stream] * publish.count
 
-    def _from_environment(self, instance: Instance) -> Iterator[Stream]:
+    def _from_environment(self, instance: Instance) -> Iterator[MessageStream]:
         """Yield what a component of the environment publishes, whose computing takes no time."""
         activity = instance.activity
         if activity is not None and activity.period_ns is not None:
-            for one in instance.component.publishes.values():
-                made = Stream(self.topic(instance, one.name), instance.name, "", instance.name,
-                              activity.period_ns, activity.jitter_ns, one.size_b)  # fmt: skip
-                yield from [made] * (0 if one.on else one.count)
+            for publish in instance.component.publishes.values():
+                stream = MessageStream(
+                    self.topic(instance, publish.name),
+                    instance.name,
+                    "",
+                    instance.name,
+                    activity.period_ns,
+                    activity.jitter_ns,
+                    publish.size_b,
+                )
+                yield from [stream] * (0 if publish.on else publish.count)
 
     # -- costs
 
@@ -384,7 +428,7 @@ class FlowReader:
     def _called(self, instance: Instance, caller: str) -> _Cost:
         """Return the cost of the calls that an activation or an operation makes."""
         component = instance.component
-        ports = [one for one in instance.connections.values() if _callable(one.targets)]
+        ports = [connection for connection in instance.connections.values() if _callable(connection.targets)]
         if caller not in component.calls and (ports or is_node(instance)):
             what = f"calls of {', '.join(one.port for one in ports)}" if ports else "ROS calls"
             raise _NotStatedError(
@@ -397,14 +441,16 @@ class FlowReader:
             if not count:
                 continue
             if dot:
-                found = [self._call(instance, one, operation) for one in instance.connections[port].targets]
+                found = [
+                    self._call(instance, target, operation) for target in instance.connections[port].targets
+                ]
             else:
                 price = self._tariff(instance)(call, self._amount(instance, call))
                 found = [_Cost(price.caller, price.background, 0, 1 << 62)]
             cost = cost.plus(_greatest(found).times(count))
         return cost
 
-    def _call(self, caller: Instance, target: Target, operation: str) -> _Cost:
+    def _call(self, caller: Instance, target: ConnectionTarget, operation: str) -> _Cost:
         callee = self._instances[target.name]
         if callee.processor is None or (
             callee.processor != caller.processor and caller.component.assume.waits_ns is not None
@@ -436,18 +482,18 @@ class FlowReader:
         """Return the greatest x of a ROS call: microseconds asleep, all subscriptions of a publisher."""
         if call == "sleep":
             return (_least_distance(instance) or S) / US
-        names = (self.topic(instance, one) for one in instance.component.publishes)
-        return float(max((len(self.subscribers(one)) for one in names), default=1))
+        names = (self.topic(instance, publish) for publish in instance.component.publishes)
+        return float(max((len(self.subscribers(name)) for name in names), default=1))
 
     def _published_prices(self, instance: Instance, trigger: str) -> Iterator[Price]:
         """Yield the prices of what an activation publishes, and of the message that caused it."""
         if not is_node(instance):
             return
         tariff, component = self._tariff(instance), instance.component
-        for one in component.publishes.values():
-            if one.on == trigger:
-                readers = float(len(self.subscribers(self.topic(instance, one.name))))
-                yield from [tariff("publish", readers)] * one.count
+        for publish in component.publishes.values():
+            if publish.on == trigger:
+                readers = float(len(self.subscribers(self.topic(instance, publish.name))))
+                yield from [tariff("publish", readers)] * publish.count
         if trigger:
             yield tariff("receive")
             yield max(tariff("spin_once", 1.0), tariff("spin_once", 0.0))
@@ -466,23 +512,23 @@ class FlowReader:
                     if callee.processor == processor:
                         yield callee
 
-    def _called_from_elsewhere(self) -> Iterator[Flow | Unknown]:
+    def _called_from_elsewhere(self) -> Iterator[ActivationFlow | UnboundedExecution]:
         for name, callers in self._callers.items():
             callee = self._instances[name]
             for caller in callers:
                 if callee.processor is None or caller.processor == callee.processor:
                     continue
                 calls = caller.component.calls
-                if calls and not any(map(any, (one.values() for one in calls.values()))):
+                if calls and not any(map(any, (call.values() for call in calls.values()))):
                     continue
                 by = callee.activity or caller.activity  # a passive one has its caller's priority
                 priority = by.priority if by else 0
                 try:
                     yield self._served(callee, caller, priority)
                 except (_NotStatedError, EstimateError) as error:
-                    yield Unknown(callee.name, callee.processor, priority, str(error))
+                    yield UnboundedExecution(callee.name, callee.processor, priority, str(error))
 
-    def _served(self, callee: Instance, caller: Instance, priority: int) -> Flow:
+    def _served(self, callee: Instance, caller: Instance, priority: int) -> ActivationFlow:
         """Return what *callee* executes for the activations of *caller* on another computer.
 
         A pause lies between the calls of two activations, however long they take.
@@ -502,21 +548,30 @@ class FlowReader:
         for call, count in calls.items():
             port, _, operation = call.partition(".")
             targets = caller.connections[port].targets if port in caller.connections else ()
-            if count and any(one.name == callee.name for one in targets):
+            if count and any(target.name == callee.name for target in targets):
                 cost = cost.plus(self._operation(callee, operation).times(count))
         switch = self._processors[callee.processor or ""].context_switch_ns
         name = f"{callee.name} for {caller.name}"
-        return Flow(name, callee.name, callee.processor or "", name, priority,
-                    min(priority, cost.least_priority), cost.time + 2 * switch * cost.pieces, pause,
-                    cost.background, pieces=cost.pieces)  # fmt: skip
+        return ActivationFlow(
+            name,
+            callee.name,
+            callee.processor or "",
+            name,
+            priority,
+            min(priority, cost.least_priority),
+            cost.time + 2 * switch * cost.pieces,
+            pause,
+            cost.background,
+            pieces=cost.pieces,
+        )
 
-    def _vehicle_node(self, vehicle: Vehicle, processor: str) -> Flow | Unknown:
+    def _vehicle_node(self, vehicle: VehicleSpec, processor: str) -> ActivationFlow | UnboundedExecution:
         """Return the loop of the node that serves a vehicle, with all that it executes for commands."""
         cycle = cycle_of(vehicle.autopilot, vehicle.names)
         if cycle is None:
             why = f"{vehicle.autopilot} is a node itself: its message rates are not known"
-            return Unknown(vehicle.name, processor, VEHICLE_NODE_PRIORITY, why)
-        commanders = sum(vehicle.name in commanded_by(one) for one in self.system.instances)
+            return UnboundedExecution(vehicle.name, processor, VEHICLE_NODE_PRIORITY, why)
+        commanders = sum(vehicle.name in commanded_by(instance) for instance in self.system.instances)
         above = f"/{vehicle.name}/"
         readers = commanders + sum(
             len(found) for topic, found in self._subscribed.items() if topic.startswith(above)
@@ -530,22 +585,33 @@ class FlowReader:
         background += requests * sum(one.background for one in taken)
         switch = 2 * self._processors[processor].context_switch_ns
         pieces = cycle.messages + 3 * requests + 1
-        return Flow(vehicle.name, vehicle.name, processor, vehicle.name, VEHICLE_NODE_PRIORITY,
-                    VEHICLE_NODE_PRIORITY, cost + switch * pieces, cycle.period, background,
-                    pieces=pieces)  # fmt: skip
+        return ActivationFlow(
+            vehicle.name,
+            vehicle.name,
+            processor,
+            vehicle.name,
+            VEHICLE_NODE_PRIORITY,
+            VEHICLE_NODE_PRIORITY,
+            cost + switch * pieces,
+            cycle.period,
+            background,
+            pieces=pieces,
+        )
 
-    def _background_loads(self) -> Iterator[Flow]:
-        for one in self.system.processors:
-            if one.load > 0.0:
-                greatest = one.load + LOAD_VARIATION * min(one.load, 1.0 - one.load)
-                cost = round(greatest * LOAD_PERIOD) + 2 * one.context_switch_ns
-                for core in range(one.cores):
-                    name = load_name(one.name) + (f" {core}" if one.cores > 1 else "")
-                    yield Flow(name, name, one.name, name, LOAD_PRIORITY, LOAD_PRIORITY, cost, LOAD_PERIOD)
+    def _background_loads(self) -> Iterator[ActivationFlow]:
+        for processor in self.system.processors:
+            if processor.load > 0.0:
+                greatest = processor.load + LOAD_VARIATION * min(processor.load, 1.0 - processor.load)
+                cost = round(greatest * LOAD_PERIOD) + 2 * processor.context_switch_ns
+                for core in range(processor.cores):
+                    name = load_name(processor.name) + (f" {core}" if processor.cores > 1 else "")
+                    yield ActivationFlow(
+                        name, name, processor.name, name, LOAD_PRIORITY, LOAD_PRIORITY, cost, LOAD_PERIOD
+                    )
 
 
-def _stated_costs(figures: Sequence[Figure]) -> list[StatedCost]:
-    return [StatedCost(one.processor, one.frequency_hz, one.longest_ns) for one in figures]
+def _stated_costs(figures: Sequence[StatedFigure]) -> list[StatedCost]:
+    return [StatedCost(figure.processor, figure.frequency_hz, figure.longest_ns) for figure in figures]
 
 
 def _least_distance(instance: Instance) -> Ns | None:
@@ -554,10 +620,10 @@ def _least_distance(instance: Instance) -> Ns | None:
     return stated or max(assume.period_ns or 0, assume.pause_ns or 0) or None
 
 
-def _targets(instance: Instance) -> Iterator[Target]:
+def _targets(instance: Instance) -> Iterator[ConnectionTarget]:
     for connection in instance.connections.values():
         yield from connection.targets
 
 
-def _callable(targets: Sequence[Target]) -> bool:
-    return any(one.kind is TargetKind.INSTANCE for one in targets)
+def _callable(targets: Sequence[ConnectionTarget]) -> bool:
+    return any(target.kind is TargetKind.INSTANCE for target in targets)

@@ -10,15 +10,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from volery.cost import Catalogue, ListPrice, load_catalogue
-from volery.model.environment import Vehicle
-from volery.model.prices import Price
+from volery.model.environment import VehicleSpec
+from volery.model.prices import StatedPrice
 from volery.model.system import System
 from volery.run.assembly.bodies import CELL_NOMINAL_VOLTS, body_of
 from volery.simulation.world.body_specs import Multirotor
 
 
 @dataclass(frozen=True)
-class Part:
+class PricedPart:
     """A part with its price, or several equal ones with the price of all.
 
     ``what`` says what it is; ``year`` is None where the model does not state it.
@@ -33,7 +33,7 @@ class Part:
     estimated: bool
 
 
-def hardware(system: System) -> tuple[Part, ...]:
+def hardware(system: System) -> tuple[PricedPart, ...]:
     """Return the parts of a system in the order of the model: computers, radios, vehicles, batteries.
 
     Raises:
@@ -42,15 +42,15 @@ def hardware(system: System) -> tuple[Part, ...]:
     return tuple(_parts(system, load_catalogue(*system.catalogues)))
 
 
-def hardware_price(parts: Sequence[Part]) -> dict[str, float]:
+def hardware_price(parts: Sequence[PricedPart]) -> dict[str, float]:
     """Return the sum of the prices by currency; currencies are not converted."""
     found: dict[str, float] = {}
-    for one in parts:
-        found[one.currency] = found.get(one.currency, 0.0) + one.amount
+    for part in parts:
+        found[part.currency] = found.get(part.currency, 0.0) + part.amount
     return found
 
 
-def _parts(system: System, catalogue: Catalogue) -> Iterator[Part]:
+def _parts(system: System, catalogue: Catalogue) -> Iterator[PricedPart]:
     for processor in system.processors:
         listed = catalogue.processor(processor.kind).price
         if processor.price is not None or listed is not None:
@@ -63,7 +63,7 @@ def _parts(system: System, catalogue: Catalogue) -> Iterator[Part]:
         yield from _vehicle(vehicle, catalogue)
 
 
-def _vehicle(vehicle: Vehicle, catalogue: Catalogue) -> Iterator[Part]:
+def _vehicle(vehicle: VehicleSpec, catalogue: Catalogue) -> Iterator[PricedPart]:
     airframe = vehicle.airframe
     own = vehicle.price or (airframe.price if airframe else None)
     body = body_of(vehicle)
@@ -78,10 +78,14 @@ def _vehicle(vehicle: Vehicle, catalogue: Catalogue) -> Iterator[Part]:
     yield _part(vehicle.name, f"battery of {watt_hours:.0f} Wh", price, listed, times)
 
 
-def _part(name: str, what: str, own: Price | None, listed: ListPrice | None, times: float = 1.0) -> Part:
+def _part(
+    name: str, what: str, own: StatedPrice | None, listed: ListPrice | None, times: float = 1.0
+) -> PricedPart:
     if own is not None:
         amount = own.amount
-        return Part(name, what, times * amount.value, amount.currency, own.year, own.source, False)
+        return PricedPart(name, what, times * amount.value, amount.currency, own.year, own.source, False)
     assert listed is not None  # one of the two is there
     amount_listed = times * listed.amount
-    return Part(name, what, amount_listed, listed.currency, listed.year, listed.source, listed.estimated)
+    return PricedPart(
+        name, what, amount_listed, listed.currency, listed.year, listed.source, listed.estimated
+    )

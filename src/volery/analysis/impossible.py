@@ -14,7 +14,7 @@ from volery.analysis.budgets import memory
 from volery.base.errors import EstimateError
 from volery.base.time import MS, Ns, to_seconds
 from volery.cost import ProcessorPrices, StatedCost, load_catalogue
-from volery.model.components import Figure
+from volery.model.components import StatedFigure
 from volery.model.instances import Instance
 from volery.model.system import System
 
@@ -47,16 +47,22 @@ def why_impossible(system: System, fidelity: str) -> Iterator[str]:
 def _overloaded(system: System, least: _Least) -> Iterator[str]:
     for processor in system.processors:
         share = sum(
-            least.stated(one) / one.activity.period_ns
-            for one in system.instances
-            if one.processor == processor.name and one.activity is not None and one.activity.period_ns
+            least.stated(instance) / instance.activity.period_ns
+            for instance in system.instances
+            if instance.processor == processor.name
+            and instance.activity is not None
+            and instance.activity.period_ns
         )
         if share > processor.cores:
             yield f"{processor.name} has more to execute than it can"
 
 
 def _late(system: System, least: _Least) -> Iterator[str]:
-    instances = {one.name: one for one in system.instances if one.processor is not None and one.activity}
+    instances = {
+        instance.name: instance
+        for instance in system.instances
+        if instance.processor is not None and instance.activity
+    }
     for one in system.requirements:
         subject, _, quantity = one.observe.rpartition(".")
         instance = instances.get(subject)
@@ -76,8 +82,10 @@ class _Least:
         self._only_stated = fidelity == "times"
         catalogue = load_catalogue(*system.catalogues)
         self._prices = {
-            one.name: ProcessorPrices(one.name, catalogue.processor(one.kind), one.frequency_hz)
-            for one in system.processors
+            processor.name: ProcessorPrices(
+                processor.name, catalogue.processor(processor.kind), processor.frequency_hz
+            )
+            for processor in system.processors
         }
 
     def stated(self, instance: Instance) -> Ns:
@@ -92,10 +100,14 @@ class _Least:
             instance, [one for one in instance.component.assume.beside if one.best_ns is not None]
         )
 
-    def _scaled(self, instance: Instance, figures: Sequence[Figure]) -> Ns:
+    def _scaled(self, instance: Instance, figures: Sequence[StatedFigure]) -> Ns:
         stated = [
-            StatedCost(one.processor, one.frequency_hz, one.time_ns if one.best_ns is None else one.best_ns)
-            for one in figures
+            StatedCost(
+                figure.processor,
+                figure.frequency_hz,
+                figure.time_ns if figure.best_ns is None else figure.best_ns,
+            )
+            for figure in figures
         ]
         try:
             prices = self._prices[instance.processor or ""].stated(instance.name, {}, stated)

@@ -14,7 +14,7 @@ from volery.base.time import Ns
 from volery.requirements.ledgers import ChainLedger
 from volery.trace.events import Activation, Message
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ def longest_times(folder: Path) -> LongestTimes:
     Raises:
         UsageError: There is no trace, or it cannot be read.
     """
-    with Reading(folder / TRACE_FILE) as reading:
-        components = {one.name for one in reading.setup.components}
-        chains = [ChainLedger(one) for one in reading.setup.chains]
+    with OpenTrace(folder / TRACE_FILE) as reading:
+        components = {component.name for component in reading.setup.components}
+        chains = [ChainLedger(chain) for chain in reading.setup.chains]
         activations: list[Activation] = []
         messages: list[Message] = []
         for event in reading.events((Activation, Message)):
@@ -53,7 +53,7 @@ def longest_times(folder: Path) -> LongestTimes:
         if message.sent >= started:
             for chain in chains:
                 chain.message(message)
-    latencies = {one.setup.name: one.latencies.largest for one in chains if one.latencies.count}
+    latencies = {chain.setup.name: chain.latencies.largest for chain in chains if chain.latencies.count}
     return LongestTimes(started, responses, latencies)
 
 

@@ -23,16 +23,16 @@ from volery.analysis.busy_windows import (
     edf_bounds,
     fifo_bound,
 )
-from volery.analysis.flows import Flow, FlowReader, Flows, Stream, Unknown
+from volery.analysis.flows import ActivationFlow, FlowReader, Flows, MessageStream, UnboundedExecution
 from volery.base.time import Ns, S
 from volery.model.instances import Instance, TargetKind
-from volery.model.system import Chain, Network, Processor, System
-from volery.requirements.response_bounds import WINDOW, Demand, ManyCores, OneCore, bound_of
+from volery.model.system import Chain, NetworkSpec, ProcessorSpec, System
+from volery.requirements.response_bounds import WINDOW, ManyCores, OneCore, TaskDemand, bound_of
 
 MOST_ROUNDS = 40
 """Jitters that still grow after so many rounds have no bound."""
 
-ALWAYS_BUSY = Demand.periodic("always busy", 0, WINDOW, WINDOW)
+ALWAYS_BUSY = TaskDemand.periodic("always busy", 0, WINDOW, WINDOW)
 """A thread that keeps one core busy all the time."""
 
 ASSUMPTIONS = (
@@ -110,11 +110,11 @@ class _Holistic:
             for (topic, where), bound in self._delays.items()
         )
         return Analysis(
-            tuple(self._utilisation(one, flows) for one in self._system.processors),
-            tuple(self._load(one, flows) for one in self._system.networks),
-            {one.name: self._bounds(one, flows) for one in self._system.processors},
+            tuple(self._utilisation(processor, flows) for processor in self._system.processors),
+            tuple(self._load(network, flows) for network in self._system.networks),
+            {processor.name: self._bounds(processor, flows) for processor in self._system.processors},
             delays,
-            tuple(self._latency(one, flows) for one in self._system.chains),
+            tuple(self._latency(chain, flows) for chain in self._system.chains),
         )
 
     def _settle(self) -> Flows:
@@ -123,8 +123,8 @@ class _Holistic:
             flows = self._reader.flows(self._responses, self._delays)
             responses = {
                 bound.subject: bound.bound
-                for one in self._system.processors
-                for bound in self._bounds(one, flows)
+                for processor in self._system.processors
+                for bound in self._bounds(processor, flows)
             }
             delays = self._network_delays(flows)
             if responses == self._responses and delays == self._delays:
@@ -137,13 +137,13 @@ class _Holistic:
 
     # -- processors
 
-    def _utilisation(self, processor: Processor, flows: Flows) -> Utilisation:
+    def _utilisation(self, processor: ProcessorSpec, flows: Flows) -> Utilisation:
         known, unknown = flows.on(processor.name)
         share = sum(one.share for one in known) + sum(one.least_share for one in unknown)
         missing = tuple(f"{one.instance}: {one.why}" for one in unknown)
         return Utilisation(processor.name, share / processor.cores, missing)
 
-    def _bounds(self, processor: Processor, flows: Flows) -> tuple[Bound, ...]:
+    def _bounds(self, processor: ProcessorSpec, flows: Flows) -> tuple[Bound, ...]:
         known, unknown = flows.on(processor.name)
         refused = [Bound(one.instance, None, one.why) for one in unknown]
         if not known:
@@ -161,7 +161,7 @@ class _Holistic:
 
     # -- networks
 
-    def _messages(self, network: Network, flows: Flows) -> Iterator[tuple[Stream, str]]:
+    def _messages(self, network: NetworkSpec, flows: Flows) -> Iterator[tuple[MessageStream, str]]:
         """Yield each stream that crosses *network*, with the processor it goes to, once a subscriber."""
         for stream in flows.streams:
             for reader in self._reader.subscribers(stream.topic):
@@ -170,19 +170,19 @@ class _Holistic:
                 if self._system.network_between(stream.processor, reader.processor) == network:
                     yield stream, reader.processor
 
-    def _other_traffic(self, network: Network) -> list[str]:
+    def _other_traffic(self, network: NetworkSpec) -> list[str]:
         """Return the calls over *network*, whose rate or size the model does not state."""
-        processors = {one.name: one.processor for one in self._system.instances}
+        processors = {instance.name: instance.processor for instance in self._system.instances}
         return [
-            f"calls by {one.name}: their rate and size are not in the model"
-            for one in self._system.instances
-            for connection in one.connections.values()
+            f"calls by {instance.name}: their rate and size are not in the model"
+            for instance in self._system.instances
+            for connection in instance.connections.values()
             for target in connection.targets
             if target.kind is TargetKind.INSTANCE
-            and _crosses(network, one.processor, processors[target.name])
+            and _crosses(network, instance.processor, processors[target.name])
         ]
 
-    def _load(self, network: Network, flows: Flows) -> Utilisation:
+    def _load(self, network: NetworkSpec, flows: Flows) -> Utilisation:
         missing = self._other_traffic(network)
         share = 0.0
         for stream, where in self._messages(network, flows):
@@ -200,7 +200,7 @@ class _Holistic:
             bound = None
             if not why:
                 demands = [
-                    Demand.periodic(
+                    TaskDemand.periodic(
                         one.topic, 0, _serialisation(network, one.size_b or 0), one.period, one.jitter
                     )
                     for one, _ in messages
@@ -213,7 +213,7 @@ class _Holistic:
                 self._reasons[stream.topic, where] = why
         return found
 
-    def _why_no_delay(self, network: Network, messages: Sequence[tuple[Stream, str]]) -> str:
+    def _why_no_delay(self, network: NetworkSpec, messages: Sequence[tuple[MessageStream, str]]) -> str:
         if network.loss > 0.0:
             return f"{network.name} loses {network.loss:.2%} of all transmissions: no delay is certain"
         sizes = [one.topic for one, _ in messages if one.size_b is None]
@@ -229,22 +229,23 @@ class _Holistic:
         for place, topic in enumerate(chain.topics):
             following = chain.topics[place + 1] if place < last else ""
             steps = [
-                self._step(topic, one, following, flows)
-                for one in self._reader.subscribers(topic)
+                self._step(topic, subscriber, following, flows)
+                for subscriber in self._reader.subscribers(topic)
                 if not following
-                or following in (self._reader.topic(one, name) for name in one.component.publishes)
+                or following
+                in (self._reader.topic(subscriber, name) for name in subscriber.component.publishes)
             ]
             if not steps:
                 what = f"publishes {following} and " if following else ""
                 return Bound(chain.name, None, f"no component of the model {what}subscribes to {topic}")
-            for why in (one for one in steps if isinstance(one, str)):
+            for why in (step for step in steps if isinstance(step, str)):
                 return Bound(chain.name, None, why)
-            total += max(one for one in steps if isinstance(one, int))
+            total += max(step for step in steps if isinstance(step, int))
         return Bound(chain.name, total)
 
     def _step(self, topic: str, node: Instance, following: str, flows: Flows) -> Ns | str:
         """Return the longest time of *topic* to *node* and on to what that publishes, or why not."""
-        streams = [one for one in flows.streams if one.topic == topic]
+        streams = [stream for stream in flows.streams if stream.topic == topic]
         if not streams:
             return f"no flow with a known period and a bound publishes {topic}"
         way = 0
@@ -257,30 +258,30 @@ class _Holistic:
         if not following:
             return way
         named = next(
-            one
-            for one in node.component.publishes.values()
-            if self._reader.topic(node, one.name) == following
+            publish
+            for publish in node.component.publishes.values()
+            if self._reader.topic(node, publish.name) == following
         )
         trigger = self._reader.topic(node, named.on) if named.on else ""
         answering = [one for one in flows.known if one.instance == node.name and one.topic == trigger]
         responses = [self._responses.get(one.name) for one in answering]
         if not responses or None in responses:
             return f"no bound for the response time of {node.name}, which publishes {following}"
-        slowest = max(one for one in responses if one is not None)
+        slowest = max(response for response in responses if response is not None)
         if trigger == topic:
             return way + slowest
-        return way + max(one.period + one.jitter for one in streams) + slowest
+        return way + max(stream.period + stream.jitter for stream in streams) + slowest
 
 
-def _crosses(network: Network, one: str | None, other: str | None) -> bool:
+def _crosses(network: NetworkSpec, one: str | None, other: str | None) -> bool:
     return one != other and one in network.between and other in network.between
 
 
-def _serialisation(network: Network, size_b: float) -> Ns:
+def _serialisation(network: NetworkSpec, size_b: float) -> Ns:
     return -(-round(size_b * 8) * S // round(network.bandwidth_bit_s))
 
 
-def _stated(flow: Flow, bound: Ns | None) -> Bound:
+def _stated(flow: ActivationFlow, bound: Ns | None) -> Bound:
     why = "" if bound is not None else "the processor is full at its priority, or nearly"
     if why and flow.waits:
         why += ", with the time that it may wait for answers"
@@ -291,7 +292,7 @@ def _blamed(instance: str) -> str:
     return f"{instance} can delay it, and what that executes is not known"
 
 
-def _why_no_bound(processor: Processor, known: Sequence[Flow]) -> str:
+def _why_no_bound(processor: ProcessorSpec, known: Sequence[ActivationFlow]) -> str:
     """Return why the analysis does not hold on a processor without fixed priorities, empty if it does."""
     scheduler = processor.scheduler
     if scheduler not in ("edf", "fifo"):
@@ -309,12 +310,14 @@ def _why_no_bound(processor: Processor, known: Sequence[Flow]) -> str:
     return ""
 
 
-def _fixed_priority(processor: Processor, known: Sequence[Flow], flows: Flows) -> Iterator[Bound]:
+def _fixed_priority(
+    processor: ProcessorSpec, known: Sequence[ActivationFlow], flows: Flows
+) -> Iterator[Bound]:
     """Yield the bounds of the flows on *processor*; what may be delayed by something unknown has none."""
     unknown = flows.on(processor.name)[1]
     parallel = processor.cores > 1
     everything = [part for one in known for part in (_divided(one) if parallel else [one])]
-    threads: dict[str, list[Flow]] = {}
+    threads: dict[str, list[ActivationFlow]] = {}
     for one in sorted(everything, key=lambda each: -each.priority):
         threads.setdefault(one.thread, []).append(one)
     blamed = {thread: _delayed_by(mine, unknown) for thread, mine in threads.items()}
@@ -335,7 +338,7 @@ def _fixed_priority(processor: Processor, known: Sequence[Flow], flows: Flows) -
                 yield _stated(flow, found[flow.name])
 
 
-def _delayed_by(thread: Sequence[Flow], unknown: Sequence[Unknown]) -> str:
+def _delayed_by(thread: Sequence[ActivationFlow], unknown: Sequence[UnboundedExecution]) -> str:
     """Return the instance that can delay *thread* and of which not enough is known, or an empty text."""
     least = min(one.least_priority for one in thread)
     urgent = (one.instance for one in unknown if one.priority >= least)
@@ -343,7 +346,10 @@ def _delayed_by(thread: Sequence[Flow], unknown: Sequence[Unknown]) -> str:
 
 
 def _bound_thread(
-    processor: Processor, thread: Sequence[Flow], everything: Sequence[Flow], found: dict[str, Ns | None]
+    processor: ProcessorSpec,
+    thread: Sequence[ActivationFlow],
+    everything: Sequence[ActivationFlow],
+    found: dict[str, Ns | None],
 ) -> None:
     """Add the bounds of the flows of one thread to *found*."""
     least = min(one.least_priority for one in thread)
@@ -364,7 +370,7 @@ def _bound_thread(
         found[flow.name] = bound
 
 
-def _divided(flow: Flow) -> list[Flow]:
+def _divided(flow: ActivationFlow) -> list[ActivationFlow]:
     """Return what a flow is on several cores: its thread, and beside it the threads of its library."""
     if not flow.background:
         return [flow]
@@ -373,11 +379,13 @@ def _divided(flow: Flow) -> list[Flow]:
     return [replace(flow, background=0), library]
 
 
-def _with_jitter(flow: Flow, more: Ns) -> Demand:
+def _with_jitter(flow: ActivationFlow, more: Ns) -> TaskDemand:
     return replace(flow, jitter=flow.jitter + more).demand()
 
 
-def _on_many_cores(processor: Processor, urgent: Sequence[Flow], found: Mapping[str, Ns | None]) -> ManyCores:
+def _on_many_cores(
+    processor: ProcessorSpec, urgent: Sequence[ActivationFlow], found: Mapping[str, Ns | None]
+) -> ManyCores:
     """Return the interference on several cores. What has no bound (yet) takes a core for itself."""
     known = []
     for one in urgent:

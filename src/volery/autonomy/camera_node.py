@@ -89,10 +89,13 @@ class CameraNode:
         node.subscribe(pictures, "sensor_msgs/msg/Image", self._take_picture, QoS(_QUEUE))
 
     def _take_transforms(self, message: Any) -> None:
-        for one in message.transforms:
-            child, parent = one.child_frame_id.removeprefix("/"), one.header.frame_id.removeprefix("/")
-            at = nanoseconds(one.header.stamp)
-            wrong = self._tree.add(child, parent, at, from_transform(one.transform), static=True)
+        for transform in message.transforms:
+            child, parent = (
+                transform.child_frame_id.removeprefix("/"),
+                transform.header.frame_id.removeprefix("/"),
+            )
+            at = nanoseconds(transform.header.stamp)
+            wrong = self._tree.add(child, parent, at, from_transform(transform.transform), static=True)
             if wrong:
                 self._say_once(wrong)
 

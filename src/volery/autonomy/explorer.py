@@ -28,7 +28,7 @@ _FIRST: Ns = 2 * S
 """Time for which it looks around before the first: a cell is free after some scans."""
 
 
-class Command(NamedTuple):
+class ExplorationCommand(NamedTuple):
     """What to command.
 
     Args:
@@ -71,7 +71,7 @@ class Explorer:
         self._waited = False  # at the goal since the last choice
         self._found_none = False  # by the last choice; by the next one, too, it is done
 
-    def update(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> Command:
+    def update(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> ExplorationCommand:
         """Return what to command; the arguments are those of ``Navigator.update``."""
         navigator = self.navigator
         done("exploration")
@@ -85,14 +85,14 @@ class Explorer:
             self._until += time - self._updated
         self._updated = time
         if self._began is None or time - self._began < _FIRST or self.done or navigator.fault:
-            return Command(np.zeros(2), 0.0)
+            return ExplorationCommand(np.zeros(2), 0.0)
         came = navigator.arrived and not self._waited
         if navigator.goal is None or came or time - self._looked >= _LOOK:
             self._looked = time
             self._choose(time, pose)
         ahead = hypot(*command)
         off = wrap(atan2(command[1], command[0]) - pose.yaw) if ahead > 0.05 else 0.0
-        return Command(command, min(max(2.0 * off, -self.turn), self.turn))
+        return ExplorationCommand(command, min(max(2.0 * off, -self.turn), self.turn))
 
     def _choose(self, time: Ns, pose: Pose2) -> None:
         """Set the goal: stay with the one at hand while a frontier is near it, else take the best."""

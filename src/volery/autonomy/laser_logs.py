@@ -42,7 +42,7 @@ _SCAN, _ODOMETRY, _TRANSFORMS = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odome
 _POSE = "geometry_msgs/msg/PoseStamped"
 
 
-class Step(NamedTuple):
+class LoggedScan(NamedTuple):
     """A scan, and the pose of the vehicle by its odometry when it was taken; None without odometry.
 
     With pictures of one camera the pose is that of the odometry corrected by them (see ``motion_stereo``).
@@ -62,7 +62,7 @@ class LaserLog(NamedTuple):
         settings: How such scans become a map.
     """
 
-    steps: Iterator[Step]
+    steps: Iterator[LoggedScan]
     odometry: str
     damage: list[str]
     settings: SlamSettings = SlamSettings()  # it is immutable
@@ -140,19 +140,19 @@ class _Beams(NamedTuple):
     mounting: Pose2 = Pose2()
 
 
-def _text(path: Path, carmen: bool, damage: list[str]) -> Iterator[Step]:
-    found = _read_text(path, carmen, damage)
-    if not found:
+def _text(path: Path, carmen: bool, damage: list[str]) -> Iterator[LoggedScan]:
+    text = _read_text(path, carmen, damage)
+    if not text:
         wanted = "lines FLASER, ROBOTLASER1 or RAWLASER1" if carmen else _WANTED
         raise UsageError(f"{path}: no scan in it; there must be {wanted}")
-    back = sum(after.time < before.time for before, after in pairwise(found))
+    back = sum(after.time < before.time for before, after in pairwise(text))
     if back:
         damage.append(f"{back} scans are older than the one before; they are taken in the order of the file")
-    limit = _nothing([one.ranges for one in found])
-    for one in found:
+    limit = _nothing([one.ranges for one in text])
+    for one in text:
         most = min(one.most, MOST, limit)
         scan = scan_from_ranges(one.time, one.angles, one.ranges, LEAST, most, one.mounting)
-        yield Step(one.odometry, scan._replace(open_ends=np.zeros((0, 2))))  # it may have met glass
+        yield LoggedScan(one.odometry, scan._replace(open_ends=np.zeros((0, 2))))  # it may have met glass
 
 
 def _read_text(path: Path, carmen: bool, damage: list[str]) -> list[_Beams]:
@@ -282,7 +282,10 @@ def _bag(path: Path, scan: str, odometry: str, of_camera: bool) -> LaserLog:
     rigid = list(_transforms(bag.messages(frames))) if frames else []
     if moved:
         messages: Iterable[Any] = bag.messages([moved])
-        places = [(_ns(one.message.header.stamp) or one.at, _rigid(one.message.pose)) for one in messages]
+        places = [
+            (_ns(message.message.header.stamp) or message.at, _rigid(message.message.pose))
+            for message in messages
+        ]
         words = moved
     else:
         places = [(at, one) for at, parent, _, one in rigid if parent.strip("/").rpartition("/")[2] == "odom"]
@@ -332,7 +335,7 @@ _Transforms = list[tuple[Ns, str, str, RigidTransform]]
 def _camera(path: Path, bag: Any, pictures: str, transforms: _Transforms) -> tuple[Any, RigidTransform]:
     """Return the calibration beside the pictures of a topic, and the transform from camera to vehicle."""
     beside = f"{pictures.rpartition('/')[0]}/camera_info"
-    info = next((one.message for one in bag.messages([beside])), None)
+    info = next((message.message for message in bag.messages([beside])), None)
     if info is None:
         raise UsageError(
             f"{path}: no calibration of {pictures}; record {beside} (sensor_msgs/CameraInfo), too"
@@ -384,17 +387,17 @@ def _views(
     mounting: RigidTransform,
     places: list[tuple[Ns, RigidTransform]],
     damage: list[str],
-) -> Iterator[Step]:
+) -> Iterator[LoggedScan]:
     from volery.autonomy.markers import picture_of  # noqa: PLC0415  # OpenCV is an extra
     from volery.autonomy.motion_stereo import MotionStereo  # noqa: PLC0415
 
     stereo = MotionStereo(camera, mounting)
     wrong: list[str] = []
     last: Ns | None = None
-    for one in messages:
-        time = _ns(one.message.header.stamp) or one.at
+    for message in messages:
+        time = _ns(message.message.header.stamp) or message.at
         try:
-            picture = picture_of(one.message)
+            picture = picture_of(message.message)
         except UsageError as error:
             wrong.append(str(error))
             continue
@@ -409,7 +412,7 @@ def _views(
             before, after, part = around(places, time)
             seen = stereo.add(time, picture, interpolate(before, after, part))
             if seen is not None:
-                yield Step(*seen)
+                yield LoggedScan(*seen)
     if wrong:
         damage.append(f"{len(wrong)} pictures are left out, such as {wrong[0]}")
 
@@ -433,16 +436,16 @@ def _steps(
     poses: list[tuple[Ns, Pose2]],
     taken: Callable[[Any], LaserScan2],
     damage: list[str],
-) -> Iterator[Step]:
+) -> Iterator[LoggedScan]:
     wrong: list[str] = []
-    for one in messages:
+    for message in messages:
         try:
-            scan = taken(one.message)
+            scan = taken(message.message)
         except UsageError as error:
             wrong.append(str(error))
             continue
-        time = scan.time or one.at
-        yield Step(between(poses, time) if poses else None, scan._replace(time=time))
+        time = scan.time or message.at
+        yield LoggedScan(between(poses, time) if poses else None, scan._replace(time=time))
     if wrong:
         damage.append(f"{len(wrong)} messages that are no usable scan are left out, such as {wrong[0]}")
 
@@ -502,7 +505,7 @@ def planar(rigid: RigidTransform) -> Pose2:
 
 def _transforms(messages: Iterable[Any]) -> Iterator[tuple[Ns, str, str, RigidTransform]]:
     """Yield time, parent, child and transform."""
-    for one in messages:
-        for moved in one.message.transforms:
-            at = _ns(moved.header.stamp) or one.at
+    for message in messages:
+        for moved in message.message.transforms:
+            at = _ns(moved.header.stamp) or message.at
             yield at, moved.header.frame_id, moved.child_frame_id, from_transform(moved.transform)

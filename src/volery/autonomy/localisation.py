@@ -224,8 +224,8 @@ class Localiser:
             if near.share >= FITS:
                 return near
         reach = min(3.0 * float(max(spread[0], spread[1])) + 0.2, FARTHEST)
-        found = self._walls.search(points, guess, reach, min(3.0 * float(spread[2]) + 0.05, pi))
-        if found is None:
+        match = self._walls.search(points, guess, reach, min(3.0 * float(spread[2]) + 0.05, pi))
+        if match is None:
             return near or Match(guess, 0.0, np.zeros((3, 3)))
-        wide = self._walls.align(points, found.pose, np.maximum(spread, 0.05), 0.6)
+        wide = self._walls.align(points, match.pose, np.maximum(spread, 0.05), 0.6)
         return near if near is not None and near.share >= wide.share else wide

@@ -68,7 +68,7 @@ _LEAST_BEAMS = 20  # of a scan
 _DEEP = 0.25  # [m] points of one beam that are farther apart are of several walls
 
 
-class View(NamedTuple):
+class KeptPicture(NamedTuple):
     """A picture that is kept.
 
     Args:
@@ -114,7 +114,7 @@ class MotionStereo:
     def __init__(self, camera: CameraModel, mounting: RigidTransform) -> None:
         self._camera, self._mounting = camera, _matrix(mounting)
         self._noise = _NOISE / float(np.sqrt(camera.matrix[0, 0] * camera.matrix[1, 1]))
-        self._views: deque[View] = deque(maxlen=_VIEWS)
+        self._views: deque[KeptPicture] = deque(maxlen=_VIEWS)
         self._seen: deque[tuple[Pose2, Array]] = deque(maxlen=_GATHERED)  # points in the frame of a pose
         self._picture: Picture | None = None
         self._odometry = self._at_view = np.eye(4)  # of the camera, at the last picture and at the last view
@@ -199,7 +199,7 @@ class MotionStereo:
             self._pixels = np.vstack((self._pixels, fresh)).astype(np.float32)
             self._tracks = np.concatenate((self._tracks, self._next + np.arange(len(fresh))))
             self._next += len(fresh)
-        self._views.append(View(pose, self._tracks, self._rays()))
+        self._views.append(KeptPicture(pose, self._tracks, self._rays()))
         self._picture, self._odometry, self._at_view, self._level = picture, odometry, odometry, level
 
     # -- motion
@@ -228,7 +228,7 @@ class MotionStereo:
         for _ in range(_ROUNDS):
             off = _misfit(changed(by), before, after) / self._noise
             steps = [_misfit(changed(by + tiny * unit), before, after) for unit in np.eye(len(by))]
-            slopes = np.stack([(one / self._noise - off) / tiny for one in steps], axis=1)
+            slopes = np.stack([(step / self._noise - off) / tiny for step in steps], axis=1)
             ratio = off / _OUTLIER
             weighted = slopes / (1.0 + ratio * ratio)[:, None]
             normal = weighted.T @ slopes + np.diag(1.0 / (sigma * sigma))

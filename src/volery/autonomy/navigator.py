@@ -20,7 +20,7 @@ from volery.autonomy.grid_path import COMFORT, Cell, WaysFrom, clearance_of
 from volery.autonomy.laser_scan import LaserScan2
 from volery.autonomy.occupancy_grid import OccupancyGrid
 from volery.autonomy.planar_pose import Array, Pose2
-from volery.autonomy.trajectory import Limits, arcs_of, corner_speed
+from volery.autonomy.trajectory import TrajectoryLimits, arcs_of, corner_speed
 from volery.base.errors import UsageError
 from volery.base.metered_work import done
 from volery.base.time import MS, Ns, S, to_seconds
@@ -234,7 +234,7 @@ class Navigator:
         if not len(cells):
             return f"no way to ({goal[0]:.1f}, {goal[1]:.1f}) m is {self.least:.1f} m from all obstacles"
         self.way = np.vstack((place, window.centres(cells[1:-1]), goal))
-        limits = Limits(self.motion.fastest, _EASY * self.motion.acceleration, _DEVIATION)
+        limits = TrajectoryLimits(self.motion.fastest, _EASY * self.motion.acceleration, _DEVIATION)
         self._speeds = [corner_speed(arc, limits) for arc in arcs_of(self.way, _DEVIATION)]
         self._speeds[-1] = 0.0
         return ""

@@ -31,7 +31,7 @@ LOOKING_DOWN: Quaternion = (0.0, _HALF, -_HALF, 0.0)
 """From the axes of a camera that looks down, the upper edge of its picture ahead, to those of the body."""
 
 
-class Phase(Enum):
+class LandingPhase(Enum):
     """What a landing is about."""
 
     SEARCH = "search"
@@ -118,16 +118,16 @@ class Sight(NamedTuple):
     sigma: Vector
 
 
-class Command(NamedTuple):
+class LandingCommand(NamedTuple):
     """What the vehicle does: a velocity [m/s], and why."""
 
     velocity: Vector
-    phase: Phase
+    phase: LandingPhase
     reason: str = ""
 
 
 @dataclass(frozen=True)
-class Landing:
+class LandingState:
     """State of a landing. ``step`` makes the next one.
 
     Args:
@@ -149,7 +149,7 @@ class Landing:
         reason: Why it was aborted.
     """
 
-    phase: Phase = Phase.SEARCH
+    phase: LandingPhase = LandingPhase.SEARCH
     begun: Ns = -1
     changed: Ns = 0
     now: Ns = 0
@@ -219,8 +219,8 @@ def sight_of(
 
 
 def step(
-    landing: Landing, rules: LandingRules, now: Ns, velocity: Vector, sight: Sight | None = None
-) -> tuple[Landing, Command]:
+    landing: LandingState, rules: LandingRules, now: Ns, velocity: Vector, sight: Sight | None = None
+) -> tuple[LandingState, LandingCommand]:
     """Return the next state and what to do until the next call.
 
     Args:
@@ -236,16 +236,16 @@ def step(
     if sight is not None:
         landing = _compared(landing, sight)
         landing = _measured(landing, sight)
-    if landing.phase not in {Phase.ABORT, Phase.LAND}:
+    if landing.phase not in {LandingPhase.ABORT, LandingPhase.LAND}:
         landing = _decided(landing, rules)
-    return landing, Command(_velocity(landing, rules, velocity), landing.phase, landing.reason)
+    return landing, LandingCommand(_velocity(landing, rules, velocity), landing.phase, landing.reason)
 
 
 def _less(one: Vector, other: Vector) -> Vector:
     return one[0] - other[0], one[1] - other[1], one[2] - other[2]
 
 
-def _moved(landing: Landing, now: Ns, velocity: Vector) -> Landing:
+def _moved(landing: LandingState, now: Ns, velocity: Vector) -> LandingState:
     """Add up the velocity since the last step."""
     if landing.begun < 0:
         return replace(landing, begun=now, changed=now, now=now, trail=((now, landing.travelled),))
@@ -256,10 +256,14 @@ def _moved(landing: Landing, now: Ns, velocity: Vector) -> Landing:
     return replace(landing, now=now, travelled=(x, y, z), trail=trail, variance=(east, north, up))
 
 
-def _trimmed(landing: Landing, rules: LandingRules, seconds: float) -> Landing:
+def _trimmed(landing: LandingState, rules: LandingRules, seconds: float) -> LandingState:
     """Add up the offset of a vehicle that is near the marker."""
     offset = landing.offset
-    if landing.phase is not Phase.DESCEND or offset is None or hypot(offset[0], offset[1]) > _TRIMS_WITHIN:
+    if (
+        landing.phase is not LandingPhase.DESCEND
+        or offset is None
+        or hypot(offset[0], offset[1]) > _TRIMS_WITHIN
+    ):
         return landing
     east, north = (
         min(max(trim + rules.trim_gain * off * seconds, -rules.most_trim), rules.most_trim)
@@ -268,7 +272,7 @@ def _trimmed(landing: Landing, rules: LandingRules, seconds: float) -> Landing:
     return replace(landing, trim=(east, north))
 
 
-def _place_at(landing: Landing, at: Ns) -> Vector:
+def _place_at(landing: LandingState, at: Ns) -> Vector:
     """Return where the vehicle was, linear between two steps."""
     before, here = landing.trail[0]
     for after, there in landing.trail[1:]:
@@ -280,7 +284,7 @@ def _place_at(landing: Landing, at: Ns) -> Vector:
     return landing.trail[0][1] if at <= landing.trail[0][0] else here
 
 
-def _compared(landing: Landing, sight: Sight) -> Landing:
+def _compared(landing: LandingState, sight: Sight) -> LandingState:
     """Abort if the vehicle moves and its pictures do not: they would lead it into the ground."""
     was = _place_at(landing, sight.at)
     distance = sqrt(sum(one * one for one in sight.offset))
@@ -291,7 +295,7 @@ def _compared(landing: Landing, sight: Sight) -> Landing:
     return _abort(landing, "the pictures stay the same while the vehicle moves: restart the camera")
 
 
-def _measured(landing: Landing, sight: Sight) -> Landing:
+def _measured(landing: LandingState, sight: Sight) -> LandingState:
     """Take a sight: a filter of one state for each axis."""
     was = _place_at(landing, sight.at)
     place: Vector = was[0] + sight.offset[0], was[1] + sight.offset[1], was[2] + sight.offset[2]
@@ -310,17 +314,17 @@ def _measured(landing: Landing, sight: Sight) -> Landing:
     return replace(landing, marker=(x, y, z), variance=(east, north, up), seen=sight.at, refused=0)
 
 
-def _enter(landing: Landing, phase: Phase, **changes: float | str) -> Landing:
+def _enter(landing: LandingState, phase: LandingPhase, **changes: float | str) -> LandingState:
     return replace(landing, phase=phase, changed=landing.now, **changes)  # type: ignore[arg-type]
 
 
-def _abort(landing: Landing, reason: str) -> Landing:
-    return _enter(landing, Phase.ABORT, reason=reason)
+def _abort(landing: LandingState, reason: str) -> LandingState:
+    return _enter(landing, LandingPhase.ABORT, reason=reason)
 
 
-def _decided(landing: Landing, rules: LandingRules) -> Landing:
+def _decided(landing: LandingState, rules: LandingRules) -> LandingState:
     """Return the state with the phase that follows from what is known."""
-    if landing.phase is not Phase.COMMIT and to_seconds(landing.now - landing.begun) > rules.longest:
+    if landing.phase is not LandingPhase.COMMIT and to_seconds(landing.now - landing.begun) > rules.longest:
         return _abort(landing, f"not above the marker within {rules.longest:g} s")
     offset = landing.offset
     if offset is None:
@@ -328,28 +332,28 @@ def _decided(landing: Landing, rules: LandingRules) -> Landing:
         return _abort(landing, f"no marker was seen within {rules.search:g} s") if unfound else landing
     away, height = hypot(offset[0], offset[1]), -offset[2]
     low = height < rules.land_below
-    if low and (landing.phase is Phase.COMMIT or away < rules.centred):
-        return _enter(landing, Phase.LAND)
-    if landing.phase is Phase.COMMIT:
+    if low and (landing.phase is LandingPhase.COMMIT or away < rules.centred):
+        return _enter(landing, LandingPhase.LAND)
+    if landing.phase is LandingPhase.COMMIT:
         return landing
     if to_seconds(landing.now - landing.seen) <= rules.blink:
-        return landing if landing.phase is Phase.DESCEND else _enter(landing, Phase.DESCEND)
+        return landing if landing.phase is LandingPhase.DESCEND else _enter(landing, LandingPhase.DESCEND)
     return _unseen(landing, rules, away, height)
 
 
-def _unseen(landing: Landing, rules: LandingRules, away: float, height: float) -> Landing:
+def _unseen(landing: LandingState, rules: LandingRules, away: float, height: float) -> LandingState:
     """Return the state with the phase that follows while the marker is not seen."""
-    if landing.phase is Phase.DESCEND:
+    if landing.phase is LandingPhase.DESCEND:
         committed = height < rules.blind_below and away < rules.centred
-        return _enter(landing, Phase.COMMIT if committed else Phase.WAIT)
-    if landing.phase is Phase.CLIMB:
-        return _enter(landing, Phase.WAIT) if height > landing.top else landing
+        return _enter(landing, LandingPhase.COMMIT if committed else LandingPhase.WAIT)
+    if landing.phase is LandingPhase.CLIMB:
+        return _enter(landing, LandingPhase.WAIT) if height > landing.top else landing
     if to_seconds(landing.now - landing.changed) <= rules.patience:
         return landing
     if landing.lost >= rules.tries:
         times = "once" if landing.lost == 0 else f"{landing.lost + 1} times"
         return _abort(landing, f"the marker was lost {times}, last {height:.1f} m above it")
-    return _enter(landing, Phase.CLIMB, lost=landing.lost + 1, top=height + rules.climb_by)
+    return _enter(landing, LandingPhase.CLIMB, lost=landing.lost + 1, top=height + rules.climb_by)
 
 
 def _within(rules: LandingRules, height: float) -> float:
@@ -357,16 +361,18 @@ def _within(rules: LandingRules, height: float) -> float:
     return rules.centred + rules.cone * max(height - rules.blind_below, 0.0)
 
 
-def _velocity(landing: Landing, rules: LandingRules, flown: Vector) -> Vector:
+def _velocity(landing: LandingState, rules: LandingRules, flown: Vector) -> Vector:
     offset = landing.offset
-    if offset is None or landing.phase in {Phase.SEARCH, Phase.LAND, Phase.ABORT}:
+    if offset is None or landing.phase in {LandingPhase.SEARCH, LandingPhase.LAND, LandingPhase.ABORT}:
         return 0.0, 0.0, 0.0
     away, height = hypot(offset[0], offset[1]), -offset[2]
     share = min(rules.gain, rules.most_sideways / away) if away > 0.0 else 0.0
     up = 0.0
-    if landing.phase is Phase.CLIMB:
+    if landing.phase is LandingPhase.CLIMB:
         up = rules.climb
-    elif landing.phase is Phase.COMMIT or (landing.phase is Phase.DESCEND and away < _within(rules, height)):
+    elif landing.phase is LandingPhase.COMMIT or (
+        landing.phase is LandingPhase.DESCEND and away < _within(rules, height)
+    ):
         up = -min(rules.most_descent, max(rules.least_descent, rules.descent_gain * height))
     east, north = (
         wanted + rules.damping * (wanted - has)

@@ -145,9 +145,12 @@ class SlamNode:
     # -- what arrives
 
     def _take_transforms(self, message: Any, static: bool) -> None:
-        for one in message.transforms:
-            child, parent = one.child_frame_id.removeprefix("/"), one.header.frame_id.removeprefix("/")
-            at, rigid = nanoseconds(one.header.stamp), from_transform(one.transform)
+        for transform in message.transforms:
+            child, parent = (
+                transform.child_frame_id.removeprefix("/"),
+                transform.header.frame_id.removeprefix("/"),
+            )
+            at, rigid = nanoseconds(transform.header.stamp), from_transform(transform.transform)
             wrong = self._tree.add(child, parent, at, rigid, static=static)
             if wrong:
                 self._say_once(wrong)

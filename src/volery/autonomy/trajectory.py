@@ -22,7 +22,7 @@ from volery.base.time import Ns, S
 
 
 @dataclass(frozen=True)
-class Limits:
+class TrajectoryLimits:
     """How fast a path is flown.
 
     Args:
@@ -100,7 +100,7 @@ class Trajectory:
         position, velocity = way.at(way.duration / 2)
     """
 
-    def __init__(self, points: Array, limits: Limits) -> None:
+    def __init__(self, points: Array, limits: TrajectoryLimits) -> None:
         points = np.asarray(points, dtype=np.float64)
         if points.ndim != 2 or not len(points) or not np.isfinite(points).all():
             raise UsageError("a trajectory needs a path of at least one point, (n, 2 or 3) finite metres")
@@ -114,7 +114,7 @@ class Trajectory:
         if len(self._points) > 1:
             self._plan(limits)
 
-    def _plan(self, limits: Limits) -> None:
+    def _plan(self, limits: TrajectoryLimits) -> None:
         sides = np.diff(self._points, axis=0)
         lengths = np.sqrt((sides * sides).sum(axis=1))
         axes = sides / lengths[:, None]
@@ -215,7 +215,7 @@ def arcs_of(points: Array, deviation: float) -> list[Arc]:
     return arcs
 
 
-def corner_speed(arc: Arc, limits: Limits) -> float:
+def corner_speed(arc: Arc, limits: TrajectoryLimits) -> float:
     """Return the largest speed [m/s] on an arc: the acceleration across it is the limit."""
     if arc.radius == 0.0:
         return limits.speed if arc.angle == 0.0 else 0.0

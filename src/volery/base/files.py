@@ -1,7 +1,7 @@
 """Files of a user: regular ones only are read, and none is written through a symbolic link.
 
 A run folder or a model may come from another person. A link in it must not let a run overwrite another file,
-and a FIFO or a device in it must not let a command wait or read for ever. ``Output`` is a file of whole
+and a FIFO or a device in it must not let a command wait or read for ever. ``RecordFile`` is a file of whole
 records, which stays readable when the disk fills up or the process is killed.
 """
 
@@ -112,7 +112,7 @@ def _check_regular(descriptor: int, path: Path) -> None:
         raise OSError(errno.EINVAL, "it is no regular file", str(path))
 
 
-class Output:
+class RecordFile:
     """A file of whole records. A record that was written survives the end of this process.
 
     If the file becomes unwritable later (a full disk), it is truncated to its last whole record, ``problem``

@@ -73,7 +73,7 @@ class Egm96Grid:
         rows = [min(max(row + step, 0), ROWS - 1) for step in (-1, 0, 1, 2)]
         columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
         found = self._cells[row, column] = tuple(
-            tuple(int(self._band(one // BAND)[one % BAND, other]) for other in columns) for one in rows
+            tuple(int(self._band(row // BAND)[row % BAND, other]) for other in columns) for row in rows
         )
         return found
 

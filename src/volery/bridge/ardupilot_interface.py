@@ -32,9 +32,9 @@ from volery.bridge.node_interface import (
     Fields,
     InterfaceContext,
     OutgoingMessage,
+    PublishedByNode,
     Service,
-    Subscription,
-    Topic,
+    SubscribedTopic,
     Translator,
     stamped,
 )
@@ -63,19 +63,19 @@ _SENSOR = QoS(depth=5, reliability=BEST_EFFORT)
 _CLOCK = QoS(depth=20)
 _GEO_POINT, _TIME = "geographic_msgs/msg/GeoPointStamped", "builtin_interfaces/msg/Time"
 _TOPICS = (
-    Topic("time", _TIME, _CLOCK, on_demand=True),
-    Topic("clock", "rosgraph_msgs/msg/Clock", _CLOCK, on_demand=True),
-    Topic("navsat", "sensor_msgs/msg/NavSatFix", _SENSOR, on_demand=True),
-    Topic("battery", "sensor_msgs/msg/BatteryState", _SENSOR, on_demand=True),
-    Topic("imu/experimental/data", "sensor_msgs/msg/Imu", _SENSOR, on_demand=True),
-    Topic("pose/filtered", "geometry_msgs/msg/PoseStamped", _SENSOR, on_demand=True),
-    Topic("twist/filtered", "geometry_msgs/msg/TwistStamped", _SENSOR, on_demand=True),
-    Topic("geopose/filtered", "geographic_msgs/msg/GeoPoseStamped", _SENSOR, on_demand=True),
-    Topic("gps_global_origin/filtered", _GEO_POINT, _SENSOR, on_demand=True),
-    Topic("goal_lla", _GEO_POINT, LATCHED),
-    Topic("status", "ardupilot_msgs/msg/Status", LATCHED),
-    Topic("rc", "ardupilot_msgs/msg/Rc", _SENSOR, on_demand=True),
-    Topic("tf_static", "tf2_msgs/msg/TFMessage", LATCHED),
+    PublishedByNode("time", _TIME, _CLOCK, on_demand=True),
+    PublishedByNode("clock", "rosgraph_msgs/msg/Clock", _CLOCK, on_demand=True),
+    PublishedByNode("navsat", "sensor_msgs/msg/NavSatFix", _SENSOR, on_demand=True),
+    PublishedByNode("battery", "sensor_msgs/msg/BatteryState", _SENSOR, on_demand=True),
+    PublishedByNode("imu/experimental/data", "sensor_msgs/msg/Imu", _SENSOR, on_demand=True),
+    PublishedByNode("pose/filtered", "geometry_msgs/msg/PoseStamped", _SENSOR, on_demand=True),
+    PublishedByNode("twist/filtered", "geometry_msgs/msg/TwistStamped", _SENSOR, on_demand=True),
+    PublishedByNode("geopose/filtered", "geographic_msgs/msg/GeoPoseStamped", _SENSOR, on_demand=True),
+    PublishedByNode("gps_global_origin/filtered", _GEO_POINT, _SENSOR, on_demand=True),
+    PublishedByNode("goal_lla", _GEO_POINT, LATCHED),
+    PublishedByNode("status", "ardupilot_msgs/msg/Status", LATCHED),
+    PublishedByNode("rc", "ardupilot_msgs/msg/Rc", _SENSOR, on_demand=True),
+    PublishedByNode("tf_static", "tf2_msgs/msg/TFMessage", LATCHED),
 )
 _NUMBERED = {"navsat": "navsat/navsat0", "battery": "battery/battery0"}
 _NOT_IN_OLDEST = frozenset({"status", "goal_lla", "rc", "imu/experimental/data"})
@@ -133,7 +133,7 @@ class ArduPilotInterface:
         self._static_sent = False
         self._warned: set[str] = set()
 
-    def topics(self) -> tuple[Topic, ...]:
+    def topics(self) -> tuple[PublishedByNode, ...]:
         """Return the topics that are published."""
         return tuple(one._replace(name=self._names[one.name]) for one in _TOPICS if one.name in self._names)
 
@@ -152,12 +152,12 @@ class ArduPilotInterface:
             **{name: partial(self._imu, name) for name in IMU_SOURCES},
         }
 
-    def subscriptions(self) -> tuple[Subscription, ...]:
+    def subscriptions(self) -> tuple[SubscribedTopic, ...]:
         """Return the topics that are taken."""
         return (
-            Subscription("ap/joy", "sensor_msgs/msg/Joy", joy),
-            Subscription("ap/cmd_vel", "geometry_msgs/msg/TwistStamped", self._velocity),
-            Subscription("ap/cmd_gps_pose", "ardupilot_msgs/msg/GlobalPosition", self._global_position),
+            SubscribedTopic("ap/joy", "sensor_msgs/msg/Joy", joy),
+            SubscribedTopic("ap/cmd_vel", "geometry_msgs/msg/TwistStamped", self._velocity),
+            SubscribedTopic("ap/cmd_gps_pose", "ardupilot_msgs/msg/GlobalPosition", self._global_position),
         )
 
     def services(self) -> Mapping[str, Service]:
@@ -310,7 +310,7 @@ class ArduPilotInterface:
             message.altitude = fields["alt"] / 1e3
             accuracies = fields.get("h_acc", 0) / 1e3, fields.get("v_acc", 0) / 1e3
             if all(accuracies):
-                plane, height = (one * one for one in accuracies)
+                plane, height = (accuracy * accuracy for accuracy in accuracies)
                 message.position_covariance = [plane, 0.0, 0.0, 0.0, plane, 0.0, 0.0, 0.0, height]
                 message.position_covariance_type = 2
         self._publish("navsat", message)

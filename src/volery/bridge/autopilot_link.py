@@ -290,7 +290,7 @@ def request_stream(link: AutopilotLink, stream: int, rate: int) -> None:
     link.send_to_autopilot("REQUEST_DATA_STREAM", fields)
 
 
-class StreamRequests:
+class MissingStreams:
     """Requests the telemetry streams that do not arrive.
 
     Args:

@@ -24,9 +24,9 @@ from volery.bridge.node_interface import (
     Fields,
     InterfaceContext,
     OutgoingMessage,
+    PublishedByNode,
     Service,
-    Subscription,
-    Topic,
+    SubscribedTopic,
     Translator,
     stamped,
 )
@@ -194,7 +194,7 @@ ACCELERATION_ONLY = 1 | 2 | 4 | 8 | 16 | 32 | 1024 | 2048
 ATTITUDE_RATES_IGNORED, ATTITUDE_IGNORED = 1 | 2 | 4, 128
 
 
-def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
+def subscriptions(geoid: Geoid) -> tuple[SubscribedTopic, ...]:
     """Return all set-point subscriptions; *geoid* converts ellipsoidal altitudes to AMSL."""
 
     def position_global(message: Any, now: Ns) -> OutgoingMessage:
@@ -202,20 +202,20 @@ def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
 
     attitudes = ThrustPairs()
     return (
-        Subscription("setpoint_accel/accel", "geometry_msgs/msg/Vector3Stamped", acceleration),
-        Subscription("setpoint_attitude/attitude", "geometry_msgs/msg/PoseStamped", attitudes.attitude),
-        Subscription("setpoint_attitude/cmd_vel", "geometry_msgs/msg/TwistStamped", attitudes.rates),
-        Subscription("setpoint_attitude/thrust", "mavros_msgs/msg/Thrust", attitudes.thrust),
-        Subscription("setpoint_raw/local", "mavros_msgs/msg/PositionTarget", raw_local),
-        Subscription("setpoint_raw/global", "mavros_msgs/msg/GlobalPositionTarget", raw_global),
-        Subscription("setpoint_position/local", "geometry_msgs/msg/PoseStamped", position_local),
-        Subscription("setpoint_position/global", "geographic_msgs/msg/GeoPoseStamped", position_global),
-        Subscription("setpoint_raw/attitude", "mavros_msgs/msg/AttitudeTarget", raw_attitude),
-        Subscription("setpoint_velocity/cmd_vel", "geometry_msgs/msg/TwistStamped", velocity),
-        Subscription("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/msg/Twist", velocity_unstamped),
-        Subscription("rc/override", "mavros_msgs/msg/OverrideRCIn", rc_override),
-        Subscription("manual_control/send", "mavros_msgs/msg/ManualControl", manual_control),
-        Subscription("statustext/send", "mavros_msgs/msg/StatusText", status_text),
+        SubscribedTopic("setpoint_accel/accel", "geometry_msgs/msg/Vector3Stamped", acceleration),
+        SubscribedTopic("setpoint_attitude/attitude", "geometry_msgs/msg/PoseStamped", attitudes.attitude),
+        SubscribedTopic("setpoint_attitude/cmd_vel", "geometry_msgs/msg/TwistStamped", attitudes.rates),
+        SubscribedTopic("setpoint_attitude/thrust", "mavros_msgs/msg/Thrust", attitudes.thrust),
+        SubscribedTopic("setpoint_raw/local", "mavros_msgs/msg/PositionTarget", raw_local),
+        SubscribedTopic("setpoint_raw/global", "mavros_msgs/msg/GlobalPositionTarget", raw_global),
+        SubscribedTopic("setpoint_position/local", "geometry_msgs/msg/PoseStamped", position_local),
+        SubscribedTopic("setpoint_position/global", "geographic_msgs/msg/GeoPoseStamped", position_global),
+        SubscribedTopic("setpoint_raw/attitude", "mavros_msgs/msg/AttitudeTarget", raw_attitude),
+        SubscribedTopic("setpoint_velocity/cmd_vel", "geometry_msgs/msg/TwistStamped", velocity),
+        SubscribedTopic("setpoint_velocity/cmd_vel_unstamped", "geometry_msgs/msg/Twist", velocity_unstamped),
+        SubscribedTopic("rc/override", "mavros_msgs/msg/OverrideRCIn", rc_override),
+        SubscribedTopic("manual_control/send", "mavros_msgs/msg/ManualControl", manual_control),
+        SubscribedTopic("statustext/send", "mavros_msgs/msg/StatusText", status_text),
     )
 
 
@@ -408,9 +408,9 @@ _ros_vector = message_class("geometry_msgs/msg/Vector3")
 _quaternion = message_class("geometry_msgs/msg/Quaternion")
 
 TARGET_TOPICS = (
-    Topic("setpoint_raw/target_local", _LOCAL, on_demand=True),
-    Topic("setpoint_raw/target_global", _GLOBAL, on_demand=True),
-    Topic("setpoint_raw/target_attitude", _ATTITUDE, on_demand=True),
+    PublishedByNode("setpoint_raw/target_local", _LOCAL, on_demand=True),
+    PublishedByNode("setpoint_raw/target_global", _GLOBAL, on_demand=True),
+    PublishedByNode("setpoint_raw/target_attitude", _ATTITUDE, on_demand=True),
 )
 
 

@@ -37,7 +37,7 @@ from volery.bridge.node_interface import (
     LATCHED_STATE,
     Fields,
     InterfaceContext,
-    Topic,
+    PublishedByNode,
     Translator,
     stamped,
 )
@@ -57,12 +57,12 @@ _vector = message_class("geometry_msgs/msg/Vector3")
 _quaternion = message_class("geometry_msgs/msg/Quaternion")
 
 IMU_TOPICS = (
-    Topic("imu/data", IMU),
-    Topic("imu/data_raw", IMU, on_demand=True),
-    Topic("imu/mag", "sensor_msgs/msg/MagneticField", on_demand=True),
-    Topic("imu/static_pressure", "sensor_msgs/msg/FluidPressure", on_demand=True),
-    Topic("imu/diff_pressure", "sensor_msgs/msg/FluidPressure", on_demand=True),
-    Topic("imu/temperature_imu", "sensor_msgs/msg/Temperature", on_demand=True),
+    PublishedByNode("imu/data", IMU),
+    PublishedByNode("imu/data_raw", IMU, on_demand=True),
+    PublishedByNode("imu/mag", "sensor_msgs/msg/MagneticField", on_demand=True),
+    PublishedByNode("imu/static_pressure", "sensor_msgs/msg/FluidPressure", on_demand=True),
+    PublishedByNode("imu/diff_pressure", "sensor_msgs/msg/FluidPressure", on_demand=True),
+    PublishedByNode("imu/temperature_imu", "sensor_msgs/msg/Temperature", on_demand=True),
 )
 
 
@@ -192,20 +192,20 @@ _TWIST = "geometry_msgs/msg/TwistStamped"
 _point = message_class("geometry_msgs/msg/Point")
 
 POSE_TOPICS = (
-    Topic("global_position/global", "sensor_msgs/msg/NavSatFix"),
-    Topic("global_position/raw/fix", "sensor_msgs/msg/NavSatFix"),
-    Topic("global_position/raw/gps_vel", _TWIST, on_demand=True),
-    Topic("global_position/raw/satellites", "std_msgs/msg/UInt32", on_demand=True),
-    Topic("global_position/rel_alt", "std_msgs/msg/Float64"),
-    Topic("global_position/compass_hdg", "std_msgs/msg/Float64"),
-    Topic("global_position/local", _ODOMETRY, on_demand=True),
-    Topic("global_position/gp_origin", "geographic_msgs/msg/GeoPointStamped", LATCHED_STATE),
-    Topic("local_position/pose", "geometry_msgs/msg/PoseStamped"),
-    Topic("local_position/velocity_local", _TWIST),
-    Topic("local_position/velocity_body", _TWIST, on_demand=True),
-    Topic("local_position/odom", _ODOMETRY, on_demand=True),
-    Topic("home_position/home", "mavros_msgs/msg/HomePosition", LATCHED_STATE),
-    Topic("altitude", "mavros_msgs/msg/Altitude", on_demand=True),
+    PublishedByNode("global_position/global", "sensor_msgs/msg/NavSatFix"),
+    PublishedByNode("global_position/raw/fix", "sensor_msgs/msg/NavSatFix"),
+    PublishedByNode("global_position/raw/gps_vel", _TWIST, on_demand=True),
+    PublishedByNode("global_position/raw/satellites", "std_msgs/msg/UInt32", on_demand=True),
+    PublishedByNode("global_position/rel_alt", "std_msgs/msg/Float64"),
+    PublishedByNode("global_position/compass_hdg", "std_msgs/msg/Float64"),
+    PublishedByNode("global_position/local", _ODOMETRY, on_demand=True),
+    PublishedByNode("global_position/gp_origin", "geographic_msgs/msg/GeoPointStamped", LATCHED_STATE),
+    PublishedByNode("local_position/pose", "geometry_msgs/msg/PoseStamped"),
+    PublishedByNode("local_position/velocity_local", _TWIST),
+    PublishedByNode("local_position/velocity_body", _TWIST, on_demand=True),
+    PublishedByNode("local_position/odom", _ODOMETRY, on_demand=True),
+    PublishedByNode("home_position/home", "mavros_msgs/msg/HomePosition", LATCHED_STATE),
+    PublishedByNode("altitude", "mavros_msgs/msg/Altitude", on_demand=True),
 )
 
 
@@ -284,9 +284,9 @@ class PosePublisher:
         home_frame = frames.LocalFrame(
             home["latitude"] / 1e7, home["longitude"] / 1e7, home["altitude"] / 1000.0
         )
-        place = home_frame.to_enu(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
+        enu = home_frame.to_enu(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
         velocity = frames.ned_to_enu((fields["vx"] / 100.0, fields["vy"] / 100.0, fields["vz"] / 100.0))
-        self._publish("global_position/local", self._odometry(place, velocity, at))
+        self._publish("global_position/local", self._odometry(enu, velocity, at))
 
     def _odometry(self, place: frames.Vector, velocity: frames.Vector, at: Ns) -> Any:
         """Return an odometry; *velocity* is ENU in ``global_position/local``, FLU in ``odom``."""
@@ -368,8 +368,8 @@ _FRD_IN_FLU = (0.0, 1.0, 0.0, 0.0)
 
 
 TRANSFORM_TOPICS = (
-    Topic(TF, TF_MESSAGE, QoS(100), on_demand=True),
-    Topic(TF_STATIC, TF_MESSAGE, LATCHED),
+    PublishedByNode(TF, TF_MESSAGE, QoS(100), on_demand=True),
+    PublishedByNode(TF_STATIC, TF_MESSAGE, LATCHED),
 )
 
 

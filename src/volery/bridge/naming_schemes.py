@@ -48,9 +48,9 @@ from volery.bridge.node_interface import (
     NamingScheme,
     NodeInterface,
     OutgoingMessage,
+    PublishedByNode,
     Service,
-    Subscription,
-    Topic,
+    SubscribedTopic,
     Translator,
     merge_translators,
     stamped,
@@ -170,12 +170,12 @@ EMPTY = "std_srvs/srv/Empty"
 RC_TYPE = "roscopter/msg/RC"
 
 ROSCOPTER_TOPICS = (
-    Topic("gps", "sensor_msgs/msg/NavSatFix"),
-    Topic("rc", RC_TYPE),
-    Topic("state", "roscopter/msg/State"),
-    Topic("vfr_hud", "roscopter/msg/VFR_HUD"),
-    Topic("attitude", "roscopter/msg/Attitude"),
-    Topic("raw_imu", "roscopter/msg/Mavlink_RAW_IMU"),
+    PublishedByNode("gps", "sensor_msgs/msg/NavSatFix"),
+    PublishedByNode("rc", RC_TYPE),
+    PublishedByNode("state", "roscopter/msg/State"),
+    PublishedByNode("vfr_hud", "roscopter/msg/VFR_HUD"),
+    PublishedByNode("attitude", "roscopter/msg/Attitude"),
+    PublishedByNode("raw_imu", "roscopter/msg/Mavlink_RAW_IMU"),
 )
 _ANGLES = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
 _MEASURED = tuple(f"{axis}{kind}" for kind in ("acc", "gyro", "mag") for axis in "xyz")
@@ -276,12 +276,12 @@ def _ignore_disconnection(stamp: Ns) -> None:
 
 def roscopter_interface(context: InterfaceContext) -> NodeInterface:
     """Return the interface of a node under roscopter's names; it contains ``send_rc`` only with *control*."""
-    made = RoscopterInterface(context)
+    interface = RoscopterInterface(context)
     return NodeInterface(
         topics=ROSCOPTER_TOPICS,
-        translators=merge_translators(made.translators()),
-        subscriptions=(Subscription("send_rc", RC_TYPE, send_rc),) if context.control else (),
-        services=made.services(),
+        translators=merge_translators(interface.translators()),
+        subscriptions=(SubscribedTopic("send_rc", RC_TYPE, send_rc),) if context.control else (),
+        services=interface.services(),
         disconnected=_ignore_disconnection,
     )
 
@@ -317,12 +317,12 @@ def _px4(version: str) -> NamingScheme:
 
 def ardupilot_interface(version: str, context: InterfaceContext) -> NodeInterface:
     """Return the interface of an ArduPilot of *version* under the names of its DDS client."""
-    made = ArduPilotInterface(context, version)
+    interface = ArduPilotInterface(context, version)
     return NodeInterface(
-        topics=made.topics(),
-        translators=merge_translators(made.translators()),
-        subscriptions=made.subscriptions(),
-        services=made.services(),
+        topics=interface.topics(),
+        translators=merge_translators(interface.translators()),
+        subscriptions=interface.subscriptions(),
+        services=interface.services(),
         disconnected=_ignore_disconnection,
     )
 

@@ -33,7 +33,7 @@ _header = message_class("std_msgs/msg/Header")
 _time = message_class("builtin_interfaces/msg/Time")
 
 
-class Topic(NamedTuple):
+class PublishedByNode(NamedTuple):
     """A published topic. With *on_demand* it is published only while it has a subscription."""
 
     name: str
@@ -42,7 +42,7 @@ class Topic(NamedTuple):
     on_demand: bool = False
 
 
-class Subscription(NamedTuple):
+class SubscribedTopic(NamedTuple):
     """A subscribed topic and the function that translates a message of it to those of MAVLink."""
 
     name: str
@@ -59,9 +59,9 @@ class NodeInterface:
     returns what is to be done beside the loop.
     """
 
-    topics: Sequence[Topic]
+    topics: Sequence[PublishedByNode]
     translators: Mapping[str, Sequence[Translator]]
-    subscriptions: Sequence[Subscription]
+    subscriptions: Sequence[SubscribedTopic]
     services: Mapping[str, Service]
     disconnected: Callable[[Ns], None]
     due: Callable[[Ns], Callable[[], None] | None] = lambda now: None

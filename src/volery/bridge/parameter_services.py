@@ -17,8 +17,8 @@ from volery.bridge.autopilot_link import PX4_ID
 from volery.bridge.node_interface import (
     Fields,
     InterfaceContext,
+    PublishedByNode,
     Service,
-    Topic,
     Translator,
     stamped,
 )
@@ -35,7 +35,7 @@ VALUE = "mavros_msgs/msg/Param"
 ROS_INTEGER, ROS_DOUBLE = 2, 3
 """rcl_interfaces/ParameterType."""
 
-PARAMETER_TOPICS = (Topic("param/param_value", VALUE, on_demand=True),)
+PARAMETER_TOPICS = (PublishedByNode("param/param_value", VALUE, on_demand=True),)
 
 
 class ParameterServices:
@@ -190,7 +190,7 @@ class ParameterServices:
 
     def set_ros2(self, request: Any) -> Any:
         """Handle ``set_parameters``: each on its own."""
-        problems = [self._write_ros2(one.name, one.value) for one in request.parameters]
+        problems = [self._write_ros2(parameter.name, parameter.value) for parameter in request.parameters]
         kind = "rcl_interfaces/msg/SetParametersResult"
         results = [new(kind, successful=not problem, reason=problem) for problem in problems]
         return service("rcl_interfaces/srv/SetParameters").response(results)

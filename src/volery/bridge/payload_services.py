@@ -17,9 +17,9 @@ from volery.bridge.node_interface import (
     Fields,
     InterfaceContext,
     OutgoingMessage,
+    PublishedByNode,
     Service,
-    Subscription,
-    Topic,
+    SubscribedTopic,
     Translator,
     stamped,
 )
@@ -35,8 +35,8 @@ _ENTRY, _DATA = "mavros_msgs/msg/LogEntry", "mavros_msgs/msg/LogData"
 _time = message_class("builtin_interfaces/msg/Time")
 
 PAYLOAD_TOPICS = (
-    Topic("log_transfer/raw/log_entry", _ENTRY, LOG_QUEUE),
-    Topic("log_transfer/raw/log_data", _DATA, LOG_QUEUE),
+    PublishedByNode("log_transfer/raw/log_entry", _ENTRY, LOG_QUEUE),
+    PublishedByNode("log_transfer/raw/log_data", _DATA, LOG_QUEUE),
 )
 _CONTROL, _CONFIGURE = constant("MAV_CMD_DO_MOUNT_CONTROL"), constant("MAV_CMD_DO_MOUNT_CONFIGURE")
 SEQUENCES = 32
@@ -113,18 +113,18 @@ def mount_services(commands: CommandServices) -> Mapping[str, Service]:
     return {"mount_control/configure": ("mavros_msgs/srv/MountConfigure", configure)}
 
 
-def payload_subscriptions() -> tuple[Subscription, ...]:
+def payload_subscriptions() -> tuple[SubscribedTopic, ...]:
     """Return the subscriptions for gimbal and corrections."""
     return (
-        Subscription("mount_control/command", "mavros_msgs/msg/MountControl", mount_control),
-        Subscription("gps_rtk/send_rtcm", "mavros_msgs/msg/RTCM", partial(corrections, count())),
+        SubscribedTopic("mount_control/command", "mavros_msgs/msg/MountControl", mount_control),
+        SubscribedTopic("gps_rtk/send_rtcm", "mavros_msgs/msg/RTCM", partial(corrections, count())),
     )
 
 
-def raw_subscription(namespace: str) -> Subscription:
+def raw_subscription(namespace: str) -> SubscribedTopic:
     """Return the subscription for whole MAVLink messages; MAVROS 1 has it beside its node's namespace."""
     above = namespace.rstrip("/").rpartition("/")[0] if namespace.endswith("/mavros") else namespace
-    return Subscription(f"{above.rstrip('/')}/mavlink/to", "mavros_msgs/msg/Mavlink", whole_message)
+    return SubscribedTopic(f"{above.rstrip('/')}/mavlink/to", "mavros_msgs/msg/Mavlink", whole_message)
 
 
 def whole_message(message: Any, now: Ns) -> Frame:

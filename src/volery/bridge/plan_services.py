@@ -16,8 +16,8 @@ from volery.bridge.node_interface import (
     LATCHED_STATE,
     Fields,
     InterfaceContext,
+    PublishedByNode,
     Service,
-    Topic,
     Translator,
     stamped,
 )
@@ -50,11 +50,11 @@ RALLY_POINTS = PlanList(2, "rallypoint", ("rallypoint/waypoints", "rallypoint/ra
 
 PLAN_TOPICS = (
     *(
-        Topic(topic, _LIST, LATCHED_STATE, on_demand=True)
+        PublishedByNode(topic, _LIST, LATCHED_STATE, on_demand=True)
         for plan in (MISSION, GEOFENCE, RALLY_POINTS)
         for topic in plan.topics
     ),
-    Topic("mission/reached", "mavros_msgs/msg/WaypointReached", LATCHED_STATE),
+    PublishedByNode("mission/reached", "mavros_msgs/msg/WaypointReached", LATCHED_STATE),
 )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from volery.base import frames
 from volery.base.geoid import Geoid
 from volery.base.time import Ns, S
-from volery.bridge.node_interface import OutgoingMessage, Subscription
+from volery.bridge.node_interface import OutgoingMessage, SubscribedTopic
 from volery.links.mavlink_messages import constant
 
 LOCAL_FRD, BODY_FRD = constant("MAV_FRAME_LOCAL_FRD"), constant("MAV_FRAME_BODY_FRD")
@@ -20,7 +20,7 @@ UNSTATED, UNKNOWN = [0.0] * 21, [nan, *[0.0] * 20]
 """Covariances of which nothing is stated: MAVROS's zeros, and by MAVLink a first value that is no number."""
 
 
-def estimate_subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
+def estimate_subscriptions(geoid: Geoid) -> tuple[SubscribedTopic, ...]:
     """Return the subscriptions; *geoid* converts the ellipsoidal altitude of an origin to AMSL."""
 
     def origin(message: Any, now: Ns) -> OutgoingMessage:
@@ -31,10 +31,10 @@ def estimate_subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
 
     covariant = "geometry_msgs/msg/PoseWithCovarianceStamped"
     return (
-        Subscription("vision_pose/pose", "geometry_msgs/msg/PoseStamped", pose),
-        Subscription("vision_pose/pose_cov", covariant, pose_with_covariance),
-        Subscription("odometry/out", "nav_msgs/msg/Odometry", odometry),
-        Subscription("global_position/set_gp_origin", "geographic_msgs/msg/GeoPointStamped", origin),
+        SubscribedTopic("vision_pose/pose", "geometry_msgs/msg/PoseStamped", pose),
+        SubscribedTopic("vision_pose/pose_cov", covariant, pose_with_covariance),
+        SubscribedTopic("odometry/out", "nav_msgs/msg/Odometry", odometry),
+        SubscribedTopic("global_position/set_gp_origin", "geographic_msgs/msg/GeoPointStamped", origin),
     )
 
 

@@ -23,7 +23,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import MS, US, Ns, S
 from volery.bridge.commands import CommandServices
-from volery.bridge.node_interface import Fields, InterfaceContext, OutgoingMessage, Service, Subscription
+from volery.bridge.node_interface import Fields, InterfaceContext, OutgoingMessage, Service, SubscribedTopic
 from volery.bridge.px4_telemetry import ControlMode, PX4Telemetry, make
 from volery.links.mavlink_messages import constant
 from volery.ros.messages import service
@@ -88,7 +88,7 @@ class PX4Commands:
         """Last set-point by its kind: trajectory, attitude, body_rate."""
         self._warned: set[str] = set()
 
-    def subscriptions(self) -> tuple[Subscription, ...]:
+    def subscriptions(self) -> tuple[SubscribedTopic, ...]:
         """Return the topics."""
         taken: dict[str, tuple[str, Callable[[Any, Ns], Any]]] = {
             "offboard_control_mode": ("OffboardControlMode", self._control_mode),
@@ -103,7 +103,7 @@ class PX4Commands:
         for topic, (kind, words) in REFUSED.items():
             taken[topic] = (kind, self._refusal(topic, words))
         return tuple(
-            Subscription(topic_name("in", topic, kind), type_name(kind), translate)
+            SubscribedTopic(topic_name("in", topic, kind), type_name(kind), translate)
             for topic, (kind, translate) in taken.items()
         )
 

@@ -25,7 +25,7 @@ from typing import Any
 
 from volery.base import frames
 from volery.base.time import MS, US, Ns, S
-from volery.bridge.node_interface import Fields, InterfaceContext, Topic, Translator
+from volery.bridge.node_interface import Fields, InterfaceContext, PublishedByNode, Translator
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import BEST_EFFORT, TRANSIENT_LOCAL, QoS
 from volery.ros.messages import message_class
@@ -151,10 +151,10 @@ class PX4Telemetry:
         self._awaited: dict[int, int] = {}
         """Commands from this graph by their MAV_CMD, as the graph names them."""
 
-    def topics(self) -> tuple[Topic, ...]:
+    def topics(self) -> tuple[PublishedByNode, ...]:
         """Return the topics."""
         return tuple(
-            Topic(name, type_name(OUTPUTS[topic][0]), QOS, on_demand=topic not in _ALWAYS)
+            PublishedByNode(name, type_name(OUTPUTS[topic][0]), QOS, on_demand=topic not in _ALWAYS)
             for topic, name in self._names.items()
         )
 

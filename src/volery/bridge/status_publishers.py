@@ -18,7 +18,7 @@ from volery.bridge.node_interface import (
     LATCHED_STATE,
     Fields,
     InterfaceContext,
-    Topic,
+    PublishedByNode,
     Translator,
     stamped,
 )
@@ -45,14 +45,14 @@ _SYS_STATUS = {
 """Fields of the ROS message and of the MAVLink message."""
 
 STATUS_TOPICS = (
-    Topic("state", "mavros_msgs/msg/State", LATCHED_STATE),
-    Topic("extended_state", "mavros_msgs/msg/ExtendedState"),
-    Topic("battery", "sensor_msgs/msg/BatteryState"),
-    Topic("sys_status", "mavros_msgs/msg/SysStatus", on_demand=True),
-    Topic("statustext/recv", "mavros_msgs/msg/StatusText"),
-    Topic("vfr_hud", "mavros_msgs/msg/VfrHud"),
-    Topic("rc/in", "mavros_msgs/msg/RCIn"),
-    Topic("rc/out", "mavros_msgs/msg/RCOut", on_demand=True),
+    PublishedByNode("state", "mavros_msgs/msg/State", LATCHED_STATE),
+    PublishedByNode("extended_state", "mavros_msgs/msg/ExtendedState"),
+    PublishedByNode("battery", "sensor_msgs/msg/BatteryState"),
+    PublishedByNode("sys_status", "mavros_msgs/msg/SysStatus", on_demand=True),
+    PublishedByNode("statustext/recv", "mavros_msgs/msg/StatusText"),
+    PublishedByNode("vfr_hud", "mavros_msgs/msg/VfrHud"),
+    PublishedByNode("rc/in", "mavros_msgs/msg/RCIn"),
+    PublishedByNode("rc/out", "mavros_msgs/msg/RCOut", on_demand=True),
 )
 
 
@@ -180,10 +180,10 @@ _UNKNOWN_U8 = 255
 
 _pair = message_class("diagnostic_msgs/msg/KeyValue")
 
-DIAGNOSTIC_TOPICS = (Topic(DIAGNOSTICS, _ARRAY, on_demand=True),)
+DIAGNOSTIC_TOPICS = (PublishedByNode(DIAGNOSTICS, _ARRAY, on_demand=True),)
 
 
-class Finding(NamedTuple):
+class Diagnostic(NamedTuple):
     """One status: level, message and values."""
 
     level: int
@@ -204,21 +204,21 @@ class DiagnosticsPublisher:
 
     def disconnected(self, stamp: Ns) -> None:
         """Publish that the autopilot has stopped sending."""
-        self._publish_findings(stamp, {"FCU connection": Finding(ERROR, "not connected")})
+        self._publish_findings(stamp, {"FCU connection": Diagnostic(ERROR, "not connected")})
 
     def _heartbeat(self, fields: Fields, at: Ns) -> None:
-        checks: dict[str, tuple[str, Callable[[Fields], Finding]]] = {
+        checks: dict[str, tuple[str, Callable[[Fields], Diagnostic]]] = {
             "System": ("SYS_STATUS", _system),
             "Battery": ("SYS_STATUS", _battery),
             "GPS": ("GPS_RAW_INT", _gps),
         }
-        found = {"FCU connection": Finding(OK, "connected"), "Heartbeat": self._heartbeat_finding(fields)}
+        found = {"FCU connection": Diagnostic(OK, "connected"), "Heartbeat": self._heartbeat_finding(fields)}
         for name, (frame, check) in checks.items():
             last = self._link.last(frame)
-            found[name] = Finding(STALE, f"no {frame} yet") if last is None else check(last)
+            found[name] = Diagnostic(STALE, f"no {frame} yet") if last is None else check(last)
         self._publish_findings(at, found)
 
-    def _heartbeat_finding(self, fields: Fields) -> Finding:
+    def _heartbeat_finding(self, fields: Fields) -> Diagnostic:
         status = entry_name("MAV_STATE", fields["system_status"])
         values = {
             "Vehicle type": entry_name("MAV_TYPE", fields["type"]),
@@ -228,9 +228,9 @@ class DiagnosticsPublisher:
             "System status": status,
         }
         critical = status in ("CRITICAL", "EMERGENCY")
-        return Finding(ERROR if critical else OK, status.lower() if critical else "Normal", values)
+        return Diagnostic(ERROR if critical else OK, status.lower() if critical else "Normal", values)
 
-    def _publish_findings(self, at: Ns, found: Mapping[str, Finding]) -> None:
+    def _publish_findings(self, at: Ns, found: Mapping[str, Diagnostic]) -> None:
         if not self._wanted(DIAGNOSTICS):
             return
         name = self._node.name.lstrip("/")
@@ -238,7 +238,7 @@ class DiagnosticsPublisher:
         self._publish(DIAGNOSTICS, new(_ARRAY, header=stamped(at), status=statuses))
 
 
-def _status(name: str, hardware: str, found: Finding) -> Any:
+def _status(name: str, hardware: str, found: Diagnostic) -> Any:
     values = [_pair(key, str(one)) for key, one in found.values.items()]
     return new(
         "diagnostic_msgs/msg/DiagnosticStatus",
@@ -250,7 +250,7 @@ def _status(name: str, hardware: str, found: Finding) -> Any:
     )
 
 
-def _system(fields: Fields) -> Finding:
+def _system(fields: Fields) -> Diagnostic:
     """Return the enabled sensors that are unhealthy, and the load of the autopilot's processor."""
     enabled, healthy = fields["onboard_control_sensors_enabled"], fields["onboard_control_sensors_health"]
     unhealthy = enabled & ~healthy
@@ -261,27 +261,27 @@ def _system(fields: Fields) -> Finding:
         "CPU Load (%)": f"{fields['load'] / 10.0:.1f}",
     }
     return (
-        Finding(ERROR, f"sensors are not well: 0x{unhealthy:08X}", values)
+        Diagnostic(ERROR, f"sensors are not well: 0x{unhealthy:08X}", values)
         if unhealthy
-        else Finding(OK, "Normal", values)
+        else Diagnostic(OK, "Normal", values)
     )
 
 
-def _battery(fields: Fields) -> Finding:
+def _battery(fields: Fields) -> Diagnostic:
     millivolts, centiamperes = fields["voltage_battery"], fields["current_battery"]
     percent = fields["battery_remaining"]
     if millivolts == _UNKNOWN_U16:
-        return Finding(STALE, "No data")
+        return Diagnostic(STALE, "No data")
     values = {
         "Voltage": f"{millivolts / 1000.0:.2f}",
         "Current": "unknown" if centiamperes < 0 else f"{centiamperes / 100.0:.1f}",
         "Remaining": "unknown" if percent < 0 else f"{percent}",
     }
     low = 0 <= percent < LOW
-    return Finding(WARN, f"below {LOW} %", values) if low else Finding(OK, "Normal", values)
+    return Diagnostic(WARN, f"below {LOW} %", values) if low else Diagnostic(OK, "Normal", values)
 
 
-def _gps(fields: Fields) -> Finding:
+def _gps(fields: Fields) -> Diagnostic:
     kind, seen, spread = fields["fix_type"], fields["satellites_visible"], fields["eph"]
     values = {
         "Satellites visible": "unknown" if seen == _UNKNOWN_U8 else f"{seen}",
@@ -289,5 +289,5 @@ def _gps(fields: Fields) -> Finding:
         "EPH (m)": "unknown" if spread == _UNKNOWN_U16 else f"{spread / 100.0:.2f}",
     }
     if kind <= _NO_FIX:
-        return Finding(WARN, "No satellites" if seen == 0 else "No fix", values)
-    return Finding(OK if kind >= _FIX_3D else WARN, "3D fix" if kind >= _FIX_3D else "2D fix", values)
+        return Diagnostic(WARN, "No satellites" if seen == 0 else "No fix", values)
+    return Diagnostic(OK if kind >= _FIX_3D else WARN, "3D fix" if kind >= _FIX_3D else "2D fix", values)

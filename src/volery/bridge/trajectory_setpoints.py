@@ -16,15 +16,15 @@ from volery.base.time import MS, Ns, S
 from volery.bridge.node_interface import (
     InterfaceContext,
     OutgoingMessage,
+    PublishedByNode,
     Service,
-    Subscription,
-    Topic,
+    SubscribedTopic,
     stamped,
 )
 from volery.links.mavlink_messages import constant
 from volery.ros.messages import new, service
 
-TRAJECTORY_TOPICS = (Topic("setpoint_trajectory/desired", "nav_msgs/msg/Path"),)
+TRAJECTORY_TOPICS = (PublishedByNode("setpoint_trajectory/desired", "nav_msgs/msg/Path"),)
 _TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 _LOCAL_NED = constant("MAV_FRAME_LOCAL_NED")
 _NO_POSITION, _NO_VELOCITY, _NO_ACCELERATION, _NO_YAW, _NO_YAW_RATE = 7, 7 << 3, 7 << 6, 1 << 10, 1 << 11
@@ -37,9 +37,9 @@ class TrajectorySetpoints:
         self._link, self._publish = context.link, context.publish
         self._waiting: list[tuple[Ns, Any]] = []
 
-    def subscriptions(self) -> tuple[Subscription, ...]:
+    def subscriptions(self) -> tuple[SubscribedTopic, ...]:
         """Return the topic of trajectories."""
-        return (Subscription("setpoint_trajectory/local", _TYPE, self._begin),)
+        return (SubscribedTopic("setpoint_trajectory/local", _TYPE, self._begin),)
 
     def services(self) -> Mapping[str, Service]:
         """Return the service that drops the trajectory."""

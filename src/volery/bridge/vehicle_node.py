@@ -27,19 +27,28 @@ from volery.base.time import MS, US, Ns, S
 from volery.bridge.autopilot_link import (
     AUTOPILOT_NAMES,
     AutopilotLink,
+    MissingStreams,
     ReceivedFrame,
-    StreamRequests,
     mode_name,
 )
 from volery.bridge.naming_schemes import MAVROS
-from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Subscription
+from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, SubscribedTopic
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
 from volery.links.link import Link
 from volery.links.mavlink_messages import constant
 from volery.links.pprzros_messages import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
-from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Group, Node, Publisher, RosGraph, Work
+from volery.ros.graph import (
+    DEFAULT,
+    INVALID_VALUES,
+    SENSOR_DATA,
+    Node,
+    Publisher,
+    ReadyCallbacks,
+    RosGraph,
+    Work,
+)
 from volery.trace.events import WARNING, Text
 
 ONBOARD_CONTROLLER = constant("MAV_TYPE_ONBOARD_CONTROLLER")
@@ -214,9 +223,13 @@ class VehicleNode:
             "subscriptions",
             (
                 partial(
-                    node.subscribe, one.name, one.type, partial(self._forward, node, one, group), group=group
+                    node.subscribe,
+                    subscription.name,
+                    subscription.type,
+                    partial(self._forward, node, subscription, group),
+                    group=group,
                 )
-                for one in interface.subscriptions
+                for subscription in interface.subscriptions
             ),
         )
         self._kernel.spawn(group.spin, f"{context.component} (set-points)", context, scope)
@@ -225,7 +238,9 @@ class VehicleNode:
         """Hold requests until the set-point that has arrived is forwarded: it was published before them."""
         self._forwarding = True
 
-    def _forward(self, node: Node, subscription: Subscription, group: Group, message: Any) -> None:
+    def _forward(
+        self, node: Node, subscription: SubscribedTopic, group: ReadyCallbacks, message: Any
+    ) -> None:
         """Send a set-point to the autopilot; an invalid one is dropped with a warning."""
         try:
             translated = subscription.translate(message, self._kernel.now())
@@ -317,17 +332,17 @@ class VehicleNode:
         self.link.send("HEARTBEAT", fields)
 
 
-def _stream_requests(link: AutopilotLink, options: VehicleNodeOptions) -> StreamRequests:
+def _stream_requests(link: AutopilotLink, options: VehicleNodeOptions) -> MissingStreams:
     """Return the requests of the scheme, at the stated rate and, for single messages, at most at that."""
     names, rate = options.names, options.rate
     if rate == 0:
-        return StreamRequests(link, {}, home=False)
+        return MissingStreams(link, {}, home=False)
     streams, messages = names.streams, names.messages
     if rate is not None:
         streams = dict.fromkeys(streams, rate)
         fastest = max(messages.values(), default=0.0)
         messages = {name: rate if hertz == fastest else min(hertz, rate) for name, hertz in messages.items()}
-    return StreamRequests(link, streams, home=names.home, messages=messages)
+    return MissingStreams(link, streams, home=names.home, messages=messages)
 
 
 def serve_vehicle(

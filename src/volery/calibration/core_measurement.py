@@ -25,12 +25,12 @@ from typing import NamedTuple
 from volery.base.errors import UsageError
 from volery.calibration.host_machine import Machine
 from volery.calibration.queue_measurement import QueueSizes
-from volery.cost import Cache, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
+from volery.cost import CoreLaw, LibraryLaw, MemoryLaw, OperationTiming, SimulatedCache
 from volery.cost.native import llvm_toolchain, run_tool
 
 
 @dataclass(frozen=True)
-class Snippet:
+class AssemblySnippet:
     """Assembly of one class of operations, for the ``asm`` of GCC and clang.
 
     Attributes:
@@ -47,52 +47,56 @@ class Snippet:
 
 
 X86_64 = {
-    "alu": Snippet("add %%rbx, %%rax", "add %%rbx, %%r{0}"),
-    "increment": Snippet("add $1, %%rax", "add $1, %%r{0}"),
-    "move": Snippet("mov %%rax, %%rcx; mov %%rcx, %%rax", "mov %%rbx, %%r{0}", links=2),
-    "shift": Snippet("shl $3, %%rax", "shl $3, %%r{0}"),
-    "shifted_alu": Snippet("lea 1(%%rax,%%rax,4), %%rax", "lea 1(%%rbx,%%rbx,4), %%r{0}"),
-    "multiply": Snippet("imul %%rax, %%rax", "imul %%rbx, %%r{0}"),
-    "divide32": Snippet("xor %%edx, %%edx; div %%ebx", "mov %%r{0}d, %%eax; xor %%edx, %%edx; div %%ebx"),
-    "divide64": Snippet("xor %%edx, %%edx; div %%rbx", "mov %%r{0}, %%rax; xor %%edx, %%edx; div %%rbx"),
-    "load": Snippet("mov 16(%%rsi,%%rcx), %%rcx", "mov 16+8*{0}(%%rsi), %%r{0}"),
-    "transfer": Snippet("movq %%xmm0, %%rcx; movq %%rcx, %%xmm0", "movq %%rbx, %%xmm{0}", links=2),
-    "load_vector": Snippet(
+    "alu": AssemblySnippet("add %%rbx, %%rax", "add %%rbx, %%r{0}"),
+    "increment": AssemblySnippet("add $1, %%rax", "add $1, %%r{0}"),
+    "move": AssemblySnippet("mov %%rax, %%rcx; mov %%rcx, %%rax", "mov %%rbx, %%r{0}", links=2),
+    "shift": AssemblySnippet("shl $3, %%rax", "shl $3, %%r{0}"),
+    "shifted_alu": AssemblySnippet("lea 1(%%rax,%%rax,4), %%rax", "lea 1(%%rbx,%%rbx,4), %%r{0}"),
+    "multiply": AssemblySnippet("imul %%rax, %%rax", "imul %%rbx, %%r{0}"),
+    "divide32": AssemblySnippet(
+        "xor %%edx, %%edx; div %%ebx", "mov %%r{0}d, %%eax; xor %%edx, %%edx; div %%ebx"
+    ),
+    "divide64": AssemblySnippet(
+        "xor %%edx, %%edx; div %%rbx", "mov %%r{0}, %%rax; xor %%edx, %%edx; div %%rbx"
+    ),
+    "load": AssemblySnippet("mov 16(%%rsi,%%rcx), %%rcx", "mov 16+8*{0}(%%rsi), %%r{0}"),
+    "transfer": AssemblySnippet("movq %%xmm0, %%rcx; movq %%rcx, %%xmm0", "movq %%rbx, %%xmm{0}", links=2),
+    "load_vector": AssemblySnippet(
         "movsd 16(%%rsi,%%rcx), %%xmm0; movq %%xmm0, %%rcx",
         "movsd 16+8*{0}(%%rsi), %%xmm{0}",
         less=("transfer",),
     ),
-    "store": Snippet("mov %%rbx, 256(%%rsi)", "mov %%rbx, 256+8*{0}(%%rsi)"),
-    "branch": Snippet("jo 1f; 1:", "jo 1f; 1:"),
-    "vector": Snippet("paddd %%xmm2, %%xmm3", "paddd %%xmm2, %%xmm{0}"),
-    "vector_move": Snippet(
+    "store": AssemblySnippet("mov %%rbx, 256(%%rsi)", "mov %%rbx, 256+8*{0}(%%rsi)"),
+    "branch": AssemblySnippet("jo 1f; 1:", "jo 1f; 1:"),
+    "vector": AssemblySnippet("paddd %%xmm2, %%xmm3", "paddd %%xmm2, %%xmm{0}"),
+    "vector_move": AssemblySnippet(
         "movaps %%xmm0, %%xmm4; movaps %%xmm4, %%xmm0", "movaps %%xmm0, %%xmm{0}", links=2
     ),
-    "shuffle": Snippet("unpcklps %%xmm1, %%xmm0", "unpcklpd %%xmm0, %%xmm{0}"),
-    "vector_multiply": Snippet("pmuludq %%xmm2, %%xmm3", "pmuludq %%xmm2, %%xmm{0}"),
-    "fp_add": Snippet(
+    "shuffle": AssemblySnippet("unpcklps %%xmm1, %%xmm0", "unpcklpd %%xmm0, %%xmm{0}"),
+    "vector_multiply": AssemblySnippet("pmuludq %%xmm2, %%xmm3", "pmuludq %%xmm2, %%xmm{0}"),
+    "fp_add": AssemblySnippet(
         "andpd %%xmm0, %%xmm0; addsd %%xmm1, %%xmm0", "addsd %%xmm0, %%xmm{0}", less=("vector",)
     ),
-    "fp_multiply": Snippet("mulsd %%xmm1, %%xmm0", "mulsd %%xmm0, %%xmm{0}"),
-    "fp_compare": Snippet("maxsd %%xmm1, %%xmm0", "maxsd %%xmm0, %%xmm{0}"),
-    "fp_divide32": Snippet("divss %%xmm1, %%xmm0", "divss %%xmm0, %%xmm{0}"),
-    "fp_divide64": Snippet("divsd %%xmm1, %%xmm0", "divsd %%xmm0, %%xmm{0}"),
-    "fp_root32": Snippet("sqrtss %%xmm0, %%xmm0", "sqrtss %%xmm0, %%xmm{0}"),
-    "fp_root64": Snippet("sqrtsd %%xmm0, %%xmm0", "sqrtsd %%xmm0, %%xmm{0}"),
-    "convert": Snippet(
+    "fp_multiply": AssemblySnippet("mulsd %%xmm1, %%xmm0", "mulsd %%xmm0, %%xmm{0}"),
+    "fp_compare": AssemblySnippet("maxsd %%xmm1, %%xmm0", "maxsd %%xmm0, %%xmm{0}"),
+    "fp_divide32": AssemblySnippet("divss %%xmm1, %%xmm0", "divss %%xmm0, %%xmm{0}"),
+    "fp_divide64": AssemblySnippet("divsd %%xmm1, %%xmm0", "divsd %%xmm0, %%xmm{0}"),
+    "fp_root32": AssemblySnippet("sqrtss %%xmm0, %%xmm0", "sqrtss %%xmm0, %%xmm{0}"),
+    "fp_root64": AssemblySnippet("sqrtsd %%xmm0, %%xmm0", "sqrtsd %%xmm0, %%xmm{0}"),
+    "convert": AssemblySnippet(
         "cvtps2pd %%xmm0, %%xmm0; cvtpd2ps %%xmm0, %%xmm0", "cvtps2pd %%xmm0, %%xmm{0}", links=2
     ),
-    "conditional": Snippet("cmovo %%rbx, %%rax", "cmovo %%rbx, %%r{0}"),
-    "convert_integer": Snippet(
+    "conditional": AssemblySnippet("cmovo %%rbx, %%rax", "cmovo %%rbx, %%r{0}"),
+    "convert_integer": AssemblySnippet(
         "cvtsi2sd %%rax, %%xmm0; cvttsd2si %%xmm0, %%rax", "cvttsd2si %%xmm0, %%r{0}", links=2
     ),
-    "fp_flags": Snippet(
+    "fp_flags": AssemblySnippet(
         "ucomisd %%xmm0, %%xmm1; setp %%cl; movq %%rcx, %%xmm0",
         "ucomisd %%xmm0, %%xmm{0}",
         less=("conditional", "transfer"),
     ),
-    "vector_shift": Snippet("pslld $3, %%xmm0", "pslld $3, %%xmm{0}"),
-    "store_vector": Snippet("movsd %%xmm0, 256(%%rsi)", "movsd %%xmm0, 256+8*{0}(%%rsi)"),
+    "vector_shift": AssemblySnippet("pslld $3, %%xmm0", "pslld $3, %%xmm{0}"),
+    "store_vector": AssemblySnippet("movsd %%xmm0, 256(%%rsi)", "movsd %%xmm0, 256+8*{0}(%%rsi)"),
 }
 """``rbx`` holds 3, ``rsi`` points to two numbers and zeros, ``rcx`` is 0, ``xmm1`` is a little above 1."""
 
@@ -419,11 +423,11 @@ def _memory(taken: Mapping[str, Timing], load: float, mhz: float) -> MemoryLaw:
     behind_ns = taken[BEHIND].cycles * 1000.0 / mhz
     row_ns = taken[ROW].cycles * 1000.0 / mhz
     known = [
-        Cache(bytes=first.bytes, ways=first.ways, latency=load),
-        Cache(bytes=second.bytes, ways=second.ways, latency=round(taken[SECOND].cycles)),
+        SimulatedCache(bytes=first.bytes, ways=first.ways, latency=load),
+        SimulatedCache(bytes=second.bytes, ways=second.ways, latency=round(taken[SECOND].cycles)),
     ]
     if third != second:
-        known.append(Cache(bytes=third.bytes, ways=third.ways, latency=round(taken[THIRD].cycles)))
+        known.append(SimulatedCache(bytes=third.bytes, ways=third.ways, latency=round(taken[THIRD].cycles)))
     return MemoryLaw(
         provenance="measured",
         source=f"loads round a circle, and in a row, of {memory_bytes() >> 20} MiB; sizes by the system",

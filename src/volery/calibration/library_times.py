@@ -61,7 +61,7 @@ BY_ITEMS = frozenset((
 """Functions of numpy that take their time by elements whatever the type: they work on one at a time."""
 
 
-class Snippet(NamedTuple):
+class TimedCall(NamedTuple):
     """A call to be timed.
 
     Attributes:
@@ -111,17 +111,17 @@ _BINARY = ("add", "subtract", "multiply", "divide", "maximum", "minimum", "hypot
 _LINEAR = ("inv", "solve", "det", "eig", "svd")
 
 
-def snippets() -> Iterator[Snippet]:
+def snippets() -> Iterator[TimedCall]:
     """Yield all calls that are timed."""
     generator = np.random.default_rng(1)
-    for one in _arrays(generator):
-        yield one._replace(size="items") if one.name.removeprefix("numpy.") in BY_ITEMS else one
+    for array in _arrays(generator):
+        yield array._replace(size="items") if array.name.removeprefix("numpy.") in BY_ITEMS else array
     yield from _linear_algebra(generator)
     yield from _texts()
-    yield from itertools.starmap(Snippet, picture_calls())
+    yield from itertools.starmap(TimedCall, picture_calls())
 
 
-def features() -> Iterator[Snippet]:
+def features() -> Iterator[TimedCall]:
     """Yield the calls that price features, after ``snippets``."""
     generator = np.random.default_rng(2)
     array = generator.random((400, 30)) + 0.5
@@ -129,52 +129,54 @@ def features() -> Iterator[Snippet]:
     pairs, wide = generator.random((4000, 2)), generator.random((4000, 4))
     mask, row = generator.random(12_000) > 0.5, generator.random(12_000)
     for name in METHODS:
-        yield Snippet(f"numpy.{name}", "wrapped", getattr(np, name), (np.ones(1),))
+        yield TimedCall(f"numpy.{name}", "wrapped", getattr(np, name), (np.ones(1),))
     for name in REDUCTIONS:
-        yield Snippet(f"numpy.{name}", "loops", lambda a, name=name: getattr(a, name)(axis=1), (pairs,))
+        yield TimedCall(f"numpy.{name}", "loops", lambda a, name=name: getattr(a, name)(axis=1), (pairs,))
     for name in ("sum", "max", "min", "mean", "argmax", "argmin"):
-        yield Snippet(f"numpy.{name}", "strided", lambda a, name=name: getattr(a, name)(), (array[:, 3],))
+        yield TimedCall(f"numpy.{name}", "strided", lambda a, name=name: getattr(a, name)(), (array[:, 3],))
     for name in (*ELEMENTWISE, "copy"):
         function = getattr(np, name)
-        yield Snippet(_key(function), "loops", function, (wide[:, :2],))
-        yield Snippet(_key(function), "strided", function, (array[:, 3],))
+        yield TimedCall(_key(function), "loops", function, (wide[:, :2],))
+        yield TimedCall(_key(function), "strided", function, (array[:, 3],))
     functions = {_key(getattr(np, name)): getattr(np, name) for name in _BINARY}
     functions["numpy.operator"] = lambda a, b: a * b
     functions["numpy.less"] = lambda a, b: a < b
     functions["numpy.where"] = lambda a, b: np.where(a > 0.7, a, b)
     for key, binary in functions.items():
         if key != "numpy.where":
-            yield Snippet(key, "loops", binary, (pairs, pairs[0]))
-            yield Snippet(key, "strided", binary, (array[:, 3], other[:, 3]))
-            yield Snippet(key, "cast", binary, (array, (other * 9).astype(np.int32)))
-    yield Snippet("numpy.mask", "selected", lambda a, b: a[b], (array.ravel(), mask))
-    yield Snippet("numpy.putmask", "selected", lambda b, a, v: a.__setitem__(b, v), (mask, row, row[mask]))
-    yield Snippet("numpy.nonzero", "selected", lambda a: a.nonzero(), (mask,))
-    yield Snippet("numpy.nonzero", "coordinates", lambda a: a.nonzero(), (mask.reshape(-1, 40),))
-    yield Snippet("numpy.take", "rows", lambda a, b: a[b], (pairs, generator.integers(0, 4000, 4000)))
-    yield Snippet("numpy.mask", "rows", lambda a, b: a[b], (pairs, mask[:4000]))
+            yield TimedCall(key, "loops", binary, (pairs, pairs[0]))
+            yield TimedCall(key, "strided", binary, (array[:, 3], other[:, 3]))
+            yield TimedCall(key, "cast", binary, (array, (other * 9).astype(np.int32)))
+    yield TimedCall("numpy.mask", "selected", lambda a, b: a[b], (array.ravel(), mask))
+    yield TimedCall("numpy.putmask", "selected", lambda b, a, v: a.__setitem__(b, v), (mask, row, row[mask]))
+    yield TimedCall("numpy.nonzero", "selected", lambda a: a.nonzero(), (mask,))
+    yield TimedCall("numpy.nonzero", "coordinates", lambda a: a.nonzero(), (mask.reshape(-1, 40),))
+    yield TimedCall("numpy.take", "rows", lambda a, b: a[b], (pairs, generator.integers(0, 4000, 4000)))
+    yield TimedCall("numpy.mask", "rows", lambda a, b: a[b], (pairs, mask[:4000]))
     for name in ("matmul", "dot"):
-        yield Snippet(f"numpy.{name}", "outputs", getattr(np, name), (generator.random((1000, 3)), np.eye(3)))
+        yield TimedCall(
+            f"numpy.{name}", "outputs", getattr(np, name), (generator.random((1000, 3)), np.eye(3))
+        )
     yield from _features_of_texts()
-    yield from itertools.starmap(Snippet, picture_features())
+    yield from itertools.starmap(TimedCall, picture_features())
 
 
-def _features_of_texts() -> Iterator[Snippet]:
+def _features_of_texts() -> Iterator[TimedCall]:
     short, long = [k + 0.5 for k in range(400)], [k / 7.0 for k in range(400)]
     rows = [{"id": k, "name": "drone", "ready": k > 9, "at": [k, -k]} for k in range(100)]
     for feature, document in (("values", rows), ("floats", short), ("decimals", long)):
-        yield Snippet("json.dumps", feature, json.dumps, (document,))
-        yield Snippet("json.loads", feature, json.loads, (json.dumps(document),))
-    yield Snippet("json.dumps", "lines", lambda rows: json.dumps(rows, indent=2), (rows,))
+        yield TimedCall("json.dumps", feature, json.dumps, (document,))
+        yield TimedCall("json.loads", feature, json.loads, (json.dumps(document),))
+    yield TimedCall("json.dumps", "lines", lambda rows: json.dumps(rows, indent=2), (rows,))
     line = "2026-11-23 12:00:01.250 INFO drone_3 battery=15.82 alt=101.5 msg='hold position'"
     lines = "\n".join([line] * 40)
     for name in ("findall", "split", "sub", "search"):
-        yield Snippet(f"re.{name}", "scanned", *_of_pattern(name, r"\s*#.*$", lines))
+        yield TimedCall(f"re.{name}", "scanned", *_of_pattern(name, r"\s*#.*$", lines))
     for name in ("findall", "split"):
-        yield Snippet(f"re.{name}", "found", *_of_pattern(name, r"battery=(\d+\.\d+)", lines))
-    yield Snippet("re.sub", "removed", *_of_pattern("sub", r"battery=", lines))
+        yield TimedCall(f"re.{name}", "found", *_of_pattern(name, r"battery=(\d+\.\d+)", lines))
+    yield TimedCall("re.sub", "removed", *_of_pattern("sub", r"battery=", lines))
     for name in ("match", "fullmatch", "search"):
-        yield Snippet(
+        yield TimedCall(
             f"re.{name}", "matched", *_of_pattern(name, r"(?P<day>[\d-]+) ([\d:.]+) ([A-Z]+) (\w+).*", line)
         )
     random = np.random.default_rng(3)
@@ -183,8 +185,8 @@ def _features_of_texts() -> Iterator[Snippet]:
     )
     readings = "\n".join(f"{k / 50:.2f},{random.normal():.4f},{k % 9}" for k in range(500)).encode()
     for data in (records, readings):
-        yield Snippet("zlib.compress", "part packed", zlib.compress, (data,))
-        yield Snippet("zlib.decompress", "part packed", zlib.decompress, (zlib.compress(data),))
+        yield TimedCall("zlib.compress", "part packed", zlib.compress, (data,))
+        yield TimedCall("zlib.decompress", "part packed", zlib.decompress, (zlib.compress(data),))
 
 
 def _of_pattern(name: str, pattern: str, text: str) -> tuple[Callable[..., object], tuple[object, ...]]:
@@ -194,84 +196,84 @@ def _of_pattern(name: str, pattern: str, text: str) -> tuple[Callable[..., objec
     return (lambda own, *rest: getattr(own, name)(*rest)), (compiled, *given)
 
 
-def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
+def _arrays(generator: np.random.Generator) -> Iterator[TimedCall]:
     for side in SIDES:
         row = generator.random(side * side)
         fitted = (np.linspace(-1.0, 1.0, max(row.size, 5)), np.resize(row, max(row.size, 5)))
-        yield Snippet("numpy.interp", "elements", np.interp, (row, *fitted))
-        yield Snippet("numpy.polyfit", "elements", np.polyfit, (*fitted, 3))
-        yield Snippet("numpy.polyval", "elements", np.polyval, ((0.1, 0.2, 0.3, 0.4), row))
-        yield Snippet("numpy.rfft", "elements", np.fft.rfft, (row,))
-        yield Snippet("numpy.fft", "elements", np.fft.fft, (row,))
+        yield TimedCall("numpy.interp", "elements", np.interp, (row, *fitted))
+        yield TimedCall("numpy.polyfit", "elements", np.polyfit, (*fitted, 3))
+        yield TimedCall("numpy.polyval", "elements", np.polyval, ((0.1, 0.2, 0.3, 0.4), row))
+        yield TimedCall("numpy.rfft", "elements", np.fft.rfft, (row,))
+        yield TimedCall("numpy.fft", "elements", np.fft.fft, (row,))
         for name in ("column_stack", "stack", "vstack", "hstack"):
-            yield Snippet(f"numpy.{name}", "elements", getattr(np, name), ([row, row],))
+            yield TimedCall(f"numpy.{name}", "elements", getattr(np, name), ([row, row],))
         for name in ("sort", "argsort", "median"):
-            yield Snippet(f"numpy.{name}", "elements", getattr(np, name), (row,))
-        yield Snippet("numpy.histogram", "items", np.histogram, (row,))
-        yield Snippet("numpy.percentile", "items", np.percentile, (row, 90.0))
-        yield Snippet("numpy.nonzero", "elements", lambda a: a.nonzero(), (row > 2.0,))
+            yield TimedCall(f"numpy.{name}", "elements", getattr(np, name), (row,))
+        yield TimedCall("numpy.histogram", "items", np.histogram, (row,))
+        yield TimedCall("numpy.percentile", "items", np.percentile, (row, 90.0))
+        yield TimedCall("numpy.nonzero", "elements", lambda a: a.nonzero(), (row > 2.0,))
         numbers = generator.integers(0, 20 * row.size, row.size)
-        yield Snippet("numpy.unique", "elements", lambda a: np.unique(a, return_index=True), (numbers,))
+        yield TimedCall("numpy.unique", "elements", lambda a: np.unique(a, return_index=True), (numbers,))
         array = generator.random((side, side)) + 0.5
         other = generator.random((side, side)) + 0.5
         for name in _UNARY:
-            yield Snippet(_key(getattr(np, name)), "elements", getattr(np, name), (array,))
+            yield TimedCall(_key(getattr(np, name)), "elements", getattr(np, name), (array,))
         for name in METHODS:
-            yield Snippet(f"numpy.{name}", "elements", getattr(np.ndarray, name), (array,))
+            yield TimedCall(f"numpy.{name}", "elements", getattr(np.ndarray, name), (array,))
         for name in _BINARY:
-            yield Snippet(_key(getattr(np, name)), "elements", getattr(np, name), (array, other))
-        yield Snippet("numpy.operator", "elements", lambda a, b: a * b, (array, other))
-        yield Snippet("numpy.less", "elements", lambda a, b: a < b, (array, other))
-        yield Snippet("numpy.mask", "elements", lambda a, b: a[b], (array, array > 2.0))
-        yield Snippet("numpy.remainder", "elements", lambda a, b: a % b, (array, other))
-        yield Snippet("numpy.where", "elements", np.where, (array > 1.0, array, other))
-        yield Snippet("numpy.clip", "elements", np.clip, (array, 0.2, 0.8))
-        yield Snippet("numpy.concatenate", "elements", lambda a: np.concatenate((a, a)), (array,))
-        yield Snippet("numpy.zeros", "elements", np.zeros, (array.shape,))
-        yield Snippet("numpy.ones", "elements", np.ones, (array.shape,))
-        yield Snippet("numpy.linspace", "elements", np.linspace, (0.0, 1.0, row.size))
-        yield Snippet("numpy.meshgrid", "elements", np.meshgrid, (row[:side], row[:side]))
-        yield Snippet("numpy.subscript", "elements", lambda a: a[a.shape[0] // 2 :, :], (array,))
-        yield Snippet("numpy.roll", "elements", lambda a: np.roll(a, 1, 0), (array,))
-        yield Snippet("numpy.astype", "elements", lambda a: a.astype(np.uint8), (array,))
-        yield Snippet("numpy.tolist", "elements", lambda a: a.tolist(), (array,))
-        yield Snippet(
+            yield TimedCall(_key(getattr(np, name)), "elements", getattr(np, name), (array, other))
+        yield TimedCall("numpy.operator", "elements", lambda a, b: a * b, (array, other))
+        yield TimedCall("numpy.less", "elements", lambda a, b: a < b, (array, other))
+        yield TimedCall("numpy.mask", "elements", lambda a, b: a[b], (array, array > 2.0))
+        yield TimedCall("numpy.remainder", "elements", lambda a, b: a % b, (array, other))
+        yield TimedCall("numpy.where", "elements", np.where, (array > 1.0, array, other))
+        yield TimedCall("numpy.clip", "elements", np.clip, (array, 0.2, 0.8))
+        yield TimedCall("numpy.concatenate", "elements", lambda a: np.concatenate((a, a)), (array,))
+        yield TimedCall("numpy.zeros", "elements", np.zeros, (array.shape,))
+        yield TimedCall("numpy.ones", "elements", np.ones, (array.shape,))
+        yield TimedCall("numpy.linspace", "elements", np.linspace, (0.0, 1.0, row.size))
+        yield TimedCall("numpy.meshgrid", "elements", np.meshgrid, (row[:side], row[:side]))
+        yield TimedCall("numpy.subscript", "elements", lambda a: a[a.shape[0] // 2 :, :], (array,))
+        yield TimedCall("numpy.roll", "elements", lambda a: np.roll(a, 1, 0), (array,))
+        yield TimedCall("numpy.astype", "elements", lambda a: a.astype(np.uint8), (array,))
+        yield TimedCall("numpy.tolist", "elements", lambda a: a.tolist(), (array,))
+        yield TimedCall(
             "numpy.gradient", "elements", np.gradient, (generator.random((max(side, 2), max(side, 2))),)
         )
         for name in ("random", "normal", "uniform", "integers"):
             given = {"random": (), "normal": (0.0, 1.0), "uniform": (0.0, 1.0), "integers": (0, 9)}[name]
             draw = getattr(generator, name)
-            yield Snippet(f"numpy.{name}", "elements", _of_shape(draw, array.shape), given)
-        yield Snippet("numpy.putmask", "elements", operator.setitem, (array.copy(), array > 2.0, 1.0))
-        yield Snippet("numpy.put", "elements", operator.setitem, (row.copy(), numbers // 20, 1.0))
-        yield Snippet("numpy.take", "elements", lambda a, b: a[b], (row, numbers // 20))
-        yield Snippet("numpy.*", "elements", np.clip, (array, 0.2, 0.8))
+            yield TimedCall(f"numpy.{name}", "elements", _of_shape(draw, array.shape), given)
+        yield TimedCall("numpy.putmask", "elements", operator.setitem, (array.copy(), array > 2.0, 1.0))
+        yield TimedCall("numpy.put", "elements", operator.setitem, (row.copy(), numbers // 20, 1.0))
+        yield TimedCall("numpy.take", "elements", lambda a, b: a[b], (row, numbers // 20))
+        yield TimedCall("numpy.*", "elements", np.clip, (array, 0.2, 0.8))
     for side in (1, 8, 64):
         vectors = generator.random((side * side, 3))
-        yield Snippet("numpy.cross", "elements", np.cross, (vectors, vectors))
+        yield TimedCall("numpy.cross", "elements", np.cross, (vectors, vectors))
         nested = vectors.tolist()
-        yield Snippet("numpy.array", "elements", np.array, (nested,))
-    yield Snippet("numpy.default_rng", "elements", np.random.default_rng, (1,))
-    yield Snippet("numpy.scalar", "elements", lambda a, b: a * b, (np.float64(1.5), np.float64(2.5)))
+        yield TimedCall("numpy.array", "elements", np.array, (nested,))
+    yield TimedCall("numpy.default_rng", "elements", np.random.default_rng, (1,))
+    yield TimedCall("numpy.scalar", "elements", lambda a, b: a * b, (np.float64(1.5), np.float64(2.5)))
 
 
-def _linear_algebra(generator: np.random.Generator) -> Iterator[Snippet]:
+def _linear_algebra(generator: np.random.Generator) -> Iterator[TimedCall]:
     for side in SMALL_SIDES:
         matrix = generator.random((side, side)) + np.eye(side) * side
         for name in ("matmul", "dot"):
-            yield Snippet(f"numpy.{name}", "products", getattr(np, name), (matrix, matrix))
+            yield TimedCall(f"numpy.{name}", "products", getattr(np, name), (matrix, matrix))
         for name in _LINEAR:
             function = getattr(np.linalg, name)
             given = (matrix, matrix[0]) if name == "solve" else (matrix,)
-            yield Snippet(f"numpy.{name}", "cube", function, given)
+            yield TimedCall(f"numpy.{name}", "cube", function, given)
         tall = generator.random((8 * side, side))
-        yield Snippet("numpy.norm", "elements", np.linalg.norm, (matrix,))
-        yield Snippet("numpy.lstsq", "squares", np.linalg.lstsq, (tall, tall[:, 0]))
-        yield Snippet("numpy.eye", "elements", np.eye, (side,))
-        yield Snippet("numpy.outer", "elements", np.outer, (matrix[0], matrix[0]))
+        yield TimedCall("numpy.norm", "elements", np.linalg.norm, (matrix,))
+        yield TimedCall("numpy.lstsq", "squares", np.linalg.lstsq, (tall, tall[:, 0]))
+        yield TimedCall("numpy.eye", "elements", np.eye, (side,))
+        yield TimedCall("numpy.outer", "elements", np.outer, (matrix[0], matrix[0]))
 
 
-def _texts() -> Iterator[Snippet]:
+def _texts() -> Iterator[TimedCall]:
     random = np.random.default_rng(4)
     for length in LENGTHS:
         rows = [
@@ -280,41 +282,41 @@ def _texts() -> Iterator[Snippet]:
         text = "".join(map(chr, random.integers(97, 123, length)))
         words = ("alpha 12.5 beta; " * (length // 17 + 1))[:length]
         data = words.encode()
-        yield Snippet("json.dumps", "text", json.dumps, (text,))
-        yield Snippet("json.loads", "text", json.loads, (json.dumps(text),))
+        yield TimedCall("json.dumps", "text", json.dumps, (text,))
+        yield TimedCall("json.loads", "text", json.loads, (json.dumps(text),))
         for name in ("findall", "sub", "split", "match", "search", "fullmatch"):
             function, given = _of_pattern(name, r"gamma=(\w+) ([0-9.]+)", words)
-            yield Snippet(f"re.{name}", "text", function, given)
+            yield TimedCall(f"re.{name}", "text", function, given)
         pattern = re.compile(r"(\w+) ([0-9.]+)")
         hit = pattern.match("alpha 12.5")
         assert hit is not None
-        yield Snippet("re.groups", "text", hit.groups, ())
-        yield Snippet("re.group", "text", hit.group, (1,))
+        yield TimedCall("re.groups", "text", hit.groups, ())
+        yield TimedCall("re.group", "text", hit.group, (1,))
         noise = random.integers(0, 150, length, dtype=np.uint8).tobytes()
-        yield Snippet("zlib.compress", "text", zlib.compress, (noise,))
-        yield Snippet("zlib.decompress", "text", zlib.decompress, (zlib.compress(noise),))
-        yield Snippet("zlib.crc32", "text", zlib.crc32, (data,))
-        yield Snippet("hashlib.*", "text", lambda d: hashlib.sha256(d).digest(), (data,))
-        yield Snippet("hashlib.digest", "text", hashlib.sha256(data).digest, ())
-        yield Snippet("hashlib.hexdigest", "text", hashlib.sha256(data).hexdigest, ())
-        yield Snippet("pickle.dumps", "text", pickle.dumps, (rows,))
-        yield Snippet("pickle.loads", "text", pickle.loads, (pickle.dumps(rows),))
+        yield TimedCall("zlib.compress", "text", zlib.compress, (noise,))
+        yield TimedCall("zlib.decompress", "text", zlib.decompress, (zlib.compress(noise),))
+        yield TimedCall("zlib.crc32", "text", zlib.crc32, (data,))
+        yield TimedCall("hashlib.*", "text", lambda d: hashlib.sha256(d).digest(), (data,))
+        yield TimedCall("hashlib.digest", "text", hashlib.sha256(data).digest, ())
+        yield TimedCall("hashlib.hexdigest", "text", hashlib.sha256(data).hexdigest, ())
+        yield TimedCall("pickle.dumps", "text", pickle.dumps, (rows,))
+        yield TimedCall("pickle.loads", "text", pickle.loads, (pickle.dumps(rows),))
     for fields in (1, 4, 16, 64):
         record = struct.Struct(f"<{fields}d")
         values = tuple(range(fields))
-        yield Snippet("struct.pack", "fields", record.pack, values)
-        yield Snippet("struct.unpack", "fields", record.unpack, (record.pack(*values),))
-        yield Snippet("struct.unpack_from", "fields", record.unpack_from, (record.pack(*values), 0))
+        yield TimedCall("struct.pack", "fields", record.pack, values)
+        yield TimedCall("struct.unpack", "fields", record.unpack, (record.pack(*values),))
+        yield TimedCall("struct.unpack_from", "fields", record.unpack_from, (record.pack(*values), 0))
     for length in LENGTHS:
         rows_of_8 = bytes(length // 64 * 64 + 64)
-        yield Snippet(
+        yield TimedCall(
             "struct.iter_unpack", "text", lambda b: list(struct.iter_unpack("<8d", b)), (rows_of_8,)
         )
-    yield Snippet("struct.*", "fields", struct.calcsize, ("<8d",))
-    yield Snippet("json.*", "text", json.dumps, ([1],))
-    yield Snippet("re.*", "text", re.compile, ("a",))
-    yield Snippet("pickle.*", "text", pickle.dumps, (1,))
-    yield Snippet("zlib.*", "text", zlib.adler32, (b"abc",))
+    yield TimedCall("struct.*", "fields", struct.calcsize, ("<8d",))
+    yield TimedCall("json.*", "text", json.dumps, ([1],))
+    yield TimedCall("re.*", "text", re.compile, ("a",))
+    yield TimedCall("pickle.*", "text", pickle.dumps, (1,))
+    yield TimedCall("zlib.*", "text", zlib.adler32, (b"abc",))
 
 
 CONTEXT_PROGRAMS = {
@@ -462,7 +464,7 @@ def measure_calls(
     return found
 
 
-def _of_feature(one: Snippet, law: LibraryCall) -> float:
+def _of_feature(one: TimedCall, law: LibraryCall) -> float:
     """Return the time of a feature, ns: what the call takes beyond its price without it, over its count."""
     result = one.function(*one.arguments)
     rest = law.model_copy(
@@ -528,16 +530,16 @@ def context_factors(
     """
     operations = operation_table().nanoseconds
 
-    def estimate(one: TimedCode, constant: float, growth: float, page: float) -> float:
+    def estimate(program: TimedCode, constant: float, growth: float, page: float) -> float:
         calls = in_context(table.calls, constant, growth, library)
-        return one.counted_ns(operations, table.model_copy(update={"calls": calls, "page": page}))
+        return program.counted_ns(operations, table.model_copy(update={"calls": calls, "page": page}))
 
     rows, rest = [], []
-    for one in programs:
-        took = one.median / slowdown
-        whole = estimate(one, 1.0, 1.0, 0.0)
+    for program in programs:
+        took = program.median / slowdown
+        whole = estimate(program, 1.0, 1.0, 0.0)
         steps = ((2.0, 1.0, 0.0), (1.0, 2.0, 0.0), (1.0, 1.0, 1000.0))
-        rows.append([(estimate(one, *each) - whole) / took for each in steps])
+        rows.append([(estimate(program, *each) - whole) / took for each in steps])
         rest.append((took - whole) / took)
     constant, growth, page = np.linalg.lstsq(np.array(rows), np.array(rest), rcond=None)[0]
     return 1.0 + max(0.0, float(constant)), 1.0 + max(0.0, float(growth)), max(0.0, float(page)) * 1000.0
@@ -612,7 +614,9 @@ def _slowdown(programs: Sequence[TimedCode]) -> float:
 
     Of least times, like those of calls: on a busy machine medians are longer by a factor.
     """
-    return median(min(one.nanoseconds) / one.counted_ns(operation_table().nanoseconds) for one in programs)
+    return median(
+        min(program.nanoseconds) / program.counted_ns(operation_table().nanoseconds) for program in programs
+    )
 
 
 def _scaled_work(times: WorkTimes, factor: float) -> WorkTimes:

@@ -140,8 +140,10 @@ def node_estimates(record: RunRecord, nodes: Sequence[str]) -> dict[str, NodeEst
     """Return what a simulation has charged each node."""
     found = {}
     for name in nodes:
-        one = record.components[name]
-        found[name] = NodeEstimate(one.ros_cpu_s, max(0.0, one.cpu_s - one.ros_cpu_s), one.ros_calls)
+        component = record.components[name]
+        found[name] = NodeEstimate(
+            component.ros_cpu_s, max(0.0, component.cpu_s - component.ros_cpu_s), component.ros_calls
+        )
     return found
 
 
@@ -172,9 +174,9 @@ def prepare_nodes(system: System) -> tuple[NodeProgram, ...]:
         ModelError: A component is not a node of rospy or roscpp.
         UsageError: No node is measured, or ROS or a compiler is missing.
     """
-    if not any(one.processor for one in system.instances):
+    if not any(instance.processor for instance in system.instances):
         raise UsageError("the model has no node that runs on a processor, so there is nothing to measure")
-    for language in sorted({one.component.language for one in system.instances}):
+    for language in sorted({instance.component.language for instance in system.instances}):
         if language in ("rospy", "roscpp"):
             check_client(language)
     return node_programs(system)
@@ -215,7 +217,9 @@ def estimate_nodes(system: System, fidelity: str = "code") -> dict[str, NodeEsti
     if not run.completed:
         reason = run.error or run.record.outcome.reason
         raise EstimateError(f"the simulation that estimates {system.name} failed: {reason}")
-    return node_estimates(run.record, [one.name for one in system.instances if not one.is_environment])
+    return node_estimates(
+        run.record, [instance.name for instance in system.instances if not instance.is_environment]
+    )
 
 
 def compare(
@@ -233,5 +237,5 @@ def compare(
     """
     if not runs:
         raise UsageError("no run was measured to its end")
-    languages = {one.name: one.component.language for one in system.instances}
+    languages = {instance.name: instance.component.language for instance in system.instances}
     return tuple(compare_nodes(languages, estimate, runs))

@@ -174,7 +174,7 @@ def measurement_session(
     with TemporaryDirectory(prefix="volery-measure-") as folder:
         surroundings = {**environment(master), "ROS_LOG_DIR": folder}
         with _NodeProcesses(Path(folder), surroundings) as others:
-            started = [others.start(one) for one in programs if not one.measured]
+            started = [others.start(program) for program in programs if not program.measured]
             _wait_started(started)
             _wait_registered(Master(master, "/volery"), started)
             _sleep(SETTLE)
@@ -183,14 +183,14 @@ def measurement_session(
 
 def _run(programs: Sequence[NodeProgram], nodes: _NodeProcesses, duration: Ns) -> MeasuredRun:
     with nodes:
-        started = [nodes.start(one) for one in programs if one.measured]
+        started = [nodes.start(program) for program in programs if program.measured]
         _wait_started(started)
         taken: MeasuredRun = {}
         for node in sorted(started, key=lambda one: one.began):
             _sleep(node.began + duration - time.monotonic_ns())
             taken[node.program.instance] = node.cpu()
             node.has_begun()
-    return {one.instance: taken[one.instance] for one in programs if one.measured}
+    return {program.instance: taken[program.instance] for program in programs if program.measured}
 
 
 def _sleep(duration: Ns) -> None:
@@ -209,7 +209,9 @@ def _wait_started(nodes: Sequence[_NodeProcess]) -> None:
 def _wait_registered(master: Master, nodes: Sequence[_NodeProcess]) -> None:
     """Wait until the nodes are registered at the master."""
     end = time.monotonic_ns() + READY
-    while missing := [one.program.node for one in nodes if not master.find("lookupNode", one.program.node)]:
+    while missing := [
+        node.program.node for node in nodes if not master.find("lookupNode", node.program.node)
+    ]:
         if time.monotonic_ns() > end:
             raise LinkSilent(f"{missing[0]} did not join the ROS graph within {READY / S:g} s")
         _sleep(POLL_PERIOD)

@@ -176,9 +176,9 @@ def evaluate(statements: Sequence[TimedCode], whole: Sequence[TimedCode], rounds
         whole: Timed programs: they give the factor between programs and loops, and the error.
         rounds: The precision by which pieces count as uncertain.
     """
-    empty, counts = statements[0], np.array([one.counts() for one in statements])
+    empty, counts = statements[0], np.array([statement.counts() for statement in statements])
     counts = counts[1:] - counts[0]
-    times = np.array([one.median for one in statements[1:]]) - empty.median
+    times = np.array([statement.median for statement in statements[1:]]) - empty.median
     alone = np.maximum(fit_costs(counts, times, np.ones(len(times)), FLOOR_NS), LEAST_NS)
     ratios = [
         one.median / float(np.dot(done, alone))

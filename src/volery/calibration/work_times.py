@@ -111,7 +111,9 @@ def _of_scans() -> Iterator[WorkSnippet]:
         for beams, count in ((60, 3), (180, 8), (360, 4), (360, 12), (1080, 8)):
             angles = np.linspace(-np.pi, np.pi, beams, endpoint=False)
             poses = [Pose2(*one) for one in hall.way(count)]
-            scans = [scan_from_ranges(0, angles, hall.ranges(*one, beams), 0.1, 12.0).points for one in poses]
+            scans = [
+                scan_from_ranges(0, angles, hall.ranges(*pose, beams), 0.1, 12.0).points for pose in poses
+            ]
             points = np.vstack([pose.of(scan) for pose, scan in zip(poses, scans, strict=True)])
             normals = np.vstack(
                 [Pose2(yaw=pose.yaw).of(normals_of(scan)) for pose, scan in zip(poses, scans, strict=True)]
@@ -148,7 +150,7 @@ def _of_graphs() -> Iterator[WorkSnippet]:
             poses.append(poses[-1].after(step))
         edges = [Edge(one, one + 1, step, information, True) for one in range(count - 1)]
         edges += [Edge(one, one + apart, Pose2(), information) for one in range(0, count - apart, 2)]
-        rough = [Pose2(*(np.array(one) + random.normal(0.0, 0.03, 3))) for one in poses]
+        rough = [Pose2(*(np.array(pose) + random.normal(0.0, 0.03, 3))) for pose in poses]
         yield WorkSnippet("pose_graph", partial(optimise, rough, edges))
 
 
@@ -295,11 +297,11 @@ def _of_markers() -> Iterator[WorkSnippet]:
 
 
 def _of_landings(pose: MarkerPose) -> Iterator[WorkSnippet]:
-    from volery.autonomy.precision_landing import Landing, LandingRules, sight_of, step  # noqa: PLC0415
+    from volery.autonomy.precision_landing import LandingRules, LandingState, sight_of, step  # noqa: PLC0415
 
     level, rules, still = (1.0, 0.0, 0.0, 0.0), LandingRules(), (0.0, 0.0, 0.0)
     yield WorkSnippet("sight", partial(sight_of, pose, 0, level))
-    landing = Landing()
+    landing = LandingState()
     for now in range(0, 1000 * MS, 50 * MS):
         landing, _ = step(landing, rules, now, still, sight_of(pose, now, level))
     for sight in (None, sight_of(pose, 1000 * MS, level)):

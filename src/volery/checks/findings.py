@@ -13,7 +13,7 @@ from volery.model import rules
 from volery.model.builder import ModelBuilder
 from volery.model.design import Suppression
 from volery.model.reading import Vocabulary
-from volery.model.rules import Finding
+from volery.model.rules import BrokenRule
 from volery.model.system import System
 from volery.model.system_loader import gaps, load
 from volery.model.text import CollectedModelError
@@ -31,14 +31,14 @@ class CheckedModel:
     """
 
     system: System | None
-    findings: tuple[Finding, ...]
-    suppressed: tuple[tuple[Finding, str], ...]
-    missing: dict[str, tuple[Finding, ...]]
+    findings: tuple[BrokenRule, ...]
+    suppressed: tuple[tuple[BrokenRule, str], ...]
+    missing: dict[str, tuple[BrokenRule, ...]]
 
     @property
-    def errors(self) -> tuple[Finding, ...]:
+    def errors(self) -> tuple[BrokenRule, ...]:
         """The findings that keep the model from running."""
-        return tuple(one for one in self.findings if one.rule.level == "error")
+        return tuple(finding for finding in self.findings if finding.rule.level == "error")
 
 
 def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> CheckedModel:
@@ -53,14 +53,14 @@ def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable
         UsageError: an override is none.
     """
     options = tuple(overrides)
-    found: dict[Finding, None] = {}
+    found: dict[BrokenRule, None] = {}
     system = _loaded(path, vocabulary, None, None, options, found)
     if system is None:
         return CheckedModel(None, tuple(found), (), {})
     variants: list[tuple[str | None, str | None]] = [(None, name) for name in system.allocations[1:]]
     variants += [(name, None) for name in system.scenarios]
     systems = [_loaded(path, vocabulary, *variant, options, found) for variant in variants]
-    for one in (system, *(one for one in systems if one is not None)):
+    for one in (system, *(system for system in systems if system is not None)):
         for rule in (*SYSTEM_RULES, *ROS_RULES):
             found.update(dict.fromkeys(rule(one)))
     found.update(dict.fromkeys(_code(system)))
@@ -72,10 +72,10 @@ def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable
     return CheckedModel(system, kept, suppressed, missing)
 
 
-def _is_fault(gap: Finding, system: System) -> bool:
+def _is_fault(gap: BrokenRule, system: System) -> bool:
     """Return whether a gap is a fault: an error, or a missing time of a component that states others."""
     name = gap.path.split(".")[1]
-    component = next(one.component for one in system.instances if one.component.name == name)
+    component = next(instance.component for instance in system.instances if instance.component.name == name)
     has_times = bool(component.operations or component.activation)
     return gap.rule.level == "error" or (gap.rule is rules.MISSING_TIMES and has_times)
 
@@ -86,7 +86,7 @@ def _loaded(
     scenario: str | None,
     allocation: str | None,
     options: tuple[str, ...],
-    found: dict[Finding, None],
+    found: dict[BrokenRule, None],
 ) -> System | None:
     """Return a variant of the model; None, with findings, if it is wrong."""
     try:
@@ -98,32 +98,36 @@ def _loaded(
     return system
 
 
-def _findings(error: ModelError) -> Iterator[Finding]:
+def _findings(error: ModelError) -> Iterator[BrokenRule]:
     for one in error.errors if isinstance(error, CollectedModelError) else (error,):
         yield _finding(one)
 
 
-def _finding(error: ModelError) -> Finding:
+def _finding(error: ModelError) -> BrokenRule:
     rule = rules.RULES.get(error.code, rules.WRONG_VALUE)
-    return Finding(rule, error.what, error.path, error.where)
+    return BrokenRule(rule, error.what, error.path, error.where)
 
 
-def _code(system: System) -> Iterator[Finding]:
+def _code(system: System) -> Iterator[BrokenRule]:
     try:
         check_components(system)
     except ModelError as error:
         for one in error.errors if isinstance(error, CollectedModelError) else (error,):
             rule = rules.RULES.get(one.code, rules.CODE_MISMATCH)
-            yield Finding(rule, one.what, one.path, one.where)
+            yield BrokenRule(rule, one.what, one.path, one.where)
 
 
 def _suppress(
-    found: tuple[Finding, ...], suppressions: tuple[Suppression, ...]
-) -> tuple[tuple[Finding, ...], tuple[tuple[Finding, str], ...]]:
+    found: tuple[BrokenRule, ...], suppressions: tuple[Suppression, ...]
+) -> tuple[tuple[BrokenRule, ...], tuple[tuple[BrokenRule, str], ...]]:
     """Divide findings into those that are reported and those that the model suppresses, with the reason."""
     kept, suppressed, used = [], [], set()
     for finding in found:
-        covering = [one for one in suppressions if finding.rule.suppressible and one.covers(finding)]
+        covering = [
+            suppression
+            for suppression in suppressions
+            if finding.rule.suppressible and suppression.covers(finding)
+        ]
         if covering:
             used.add(covering[0])
             suppressed.append((finding, covering[0].reason))
@@ -132,5 +136,5 @@ def _suppress(
     for number, one in enumerate(suppressions):
         if one not in used:
             what = f"nothing is reported of {one.rule}{f' at {one.at}' if one.at else ''}"
-            kept.append(Finding(rules.IDLE_SUPPRESSION, what, f"suppress.{number}", one.where))
+            kept.append(BrokenRule(rules.IDLE_SUPPRESSION, what, f"suppress.{number}", one.where))
     return tuple(kept), tuple(suppressed)

@@ -11,7 +11,7 @@ from volery.checks.system_rules import instance_path
 from volery.model import rules
 from volery.model.components import ROS_LANGUAGES
 from volery.model.instances import Instance
-from volery.model.rules import Finding
+from volery.model.rules import BrokenRule
 from volery.model.system import System
 from volery.ros.graph.interface import absolute_name, absolute_remaps, join_names
 
@@ -20,7 +20,7 @@ _ROS_NAME = re.compile(rf"(/|~/?)?{_SEGMENT}(/{_SEGMENT})*\Z")
 _OF_EVERY_GRAPH = ("/clock", "/tf", "/tf_static", "/rosout")
 
 
-def ros_names(system: System) -> Iterator[Finding]:
+def ros_names(system: System) -> Iterator[BrokenRule]:
     """Find names that ROS does not take, and nodes whose names are the same in ROS."""
     nodes: dict[str, str] = {}
     for instance in system.instances:
@@ -29,25 +29,27 @@ def ros_names(system: System) -> Iterator[Finding]:
             full = join_names(instance.namespace, instance.node_name or instance.name.replace("-", "_"))
             if full in nodes:
                 what = f"it is the node {full} in ROS, and so is {nodes[full]}"
-                yield Finding(rules.NODE_CLASH, what, instance_path(instance), instance.where)
+                yield BrokenRule(rules.NODE_CLASH, what, instance_path(instance), instance.where)
             nodes.setdefault(full, instance.name)
-    for component in {one.component.name: one.component for one in system.instances}.values():
+    for component in {instance.component.name: instance.component for instance in system.instances}.values():
         for section, topics in (("publishes", component.publishes), ("subscribes", component.subscribes)):
             for name in topics:
                 if _ROS_NAME.match(name) is None:
                     at = f"components.{component.name}.{section}.{name}"
-                    yield Finding(rules.BAD_ROS_NAME, f"{name!r} is no name in ROS", at, component.where)
+                    yield BrokenRule(rules.BAD_ROS_NAME, f"{name!r} is no name in ROS", at, component.where)
 
 
-def _names_of(instance: Instance) -> Iterator[Finding]:
+def _names_of(instance: Instance) -> Iterator[BrokenRule]:
     path = instance_path(instance)
     namespace = instance.namespace.strip("/")
     if namespace and _ROS_NAME.match(namespace) is None:
         what = f"{instance.namespace!r} is no namespace in ROS"
-        yield Finding(rules.BAD_ROS_NAME, what, f"{path}.namespace", instance.where)
+        yield BrokenRule(rules.BAD_ROS_NAME, what, f"{path}.namespace", instance.where)
     for name in (*instance.remap, *instance.remap.values()):
         if _ROS_NAME.match(name) is None:
-            yield Finding(rules.BAD_ROS_NAME, f"{name!r} is no name in ROS", f"{path}.remap", instance.where)
+            yield BrokenRule(
+                rules.BAD_ROS_NAME, f"{name!r} is no name in ROS", f"{path}.remap", instance.where
+            )
 
 
 def full_topic(instance: Instance, name: str) -> str:
@@ -58,7 +60,7 @@ def full_topic(instance: Instance, name: str) -> str:
     return absolute_remaps(known, instance.namespace, node).get(full, full)
 
 
-def topics(system: System) -> Iterator[Finding]:
+def topics(system: System) -> Iterator[BrokenRule]:
     """Find topics of two types, and those that nothing publishes or that end a chain unseen."""
     known: dict[str, tuple[str, str]] = {}
     ends = list(_topics_of(system))
@@ -66,24 +68,24 @@ def topics(system: System) -> Iterator[Finding]:
         other, by = known.setdefault(full, (kind, instance.name))
         if other != kind:
             what = f"{full} is {kind} here, and {other} in {by}"
-            yield Finding(rules.TOPIC_TYPES, what, instance_path(instance), instance.where)
+            yield BrokenRule(rules.TOPIC_TYPES, what, instance_path(instance), instance.where)
     published = {full for _, full, _, publishes in ends if publishes}
     own = (*(f"/{vehicle.name}/" for vehicle in system.vehicles), *_OF_EVERY_GRAPH)
     for instance, full, _, publishes in ends:
         if not publishes and full not in published and not full.startswith(own):
             what = f"it subscribes to {full}, which no component publishes"
-            yield Finding(rules.NOT_PUBLISHED, what, instance_path(instance), instance.where)
+            yield BrokenRule(rules.NOT_PUBLISHED, what, instance_path(instance), instance.where)
     for chain in system.chains:
         at = f"chains.{chain.name}"
         for missing in chain.topics if published else ():
             if missing not in published and not missing.startswith(own):
-                yield Finding(rules.NOT_PUBLISHED, f"no component publishes {missing}", at, chain.where)
+                yield BrokenRule(rules.NOT_PUBLISHED, f"no component publishes {missing}", at, chain.where)
         for topic in chain.topics:
             if not topic.startswith(own) and not any(
-                _may_subscribe(system, one, topic) for one in system.instances
+                _may_subscribe(system, instance, topic) for instance in system.instances
             ):
                 what = f"nothing subscribes to {topic}: no message arrives there, and no latency is observed"
-                yield Finding(rules.NOT_SUBSCRIBED, what, at, chain.where)
+                yield BrokenRule(rules.NOT_SUBSCRIBED, what, at, chain.where)
 
 
 def _may_subscribe(system: System, instance: Instance, topic: str) -> bool:
@@ -119,7 +121,7 @@ def _subscribed_in(file: Path) -> list[str] | None:
             return None
         if not isinstance(node, ast.Call) or not _SUBSCRIBES.search(ast.unparse(node.func)):
             continue
-        given = [*node.args, *(one.value for one in node.keywords)]
+        given = [*node.args, *(keyword.value for keyword in node.keywords)]
         texts = [one.value for one in given if isinstance(one, ast.Constant) and isinstance(one.value, str)]
         if not texts:
             return None
@@ -132,7 +134,7 @@ def _imports_neighbour(node: ast.Import | ast.ImportFrom, file: Path) -> bool:
     if isinstance(node, ast.ImportFrom):
         names = [node.module or ""] if not node.level else [""]
     else:
-        names = [one.name for one in node.names]
+        names = [name.name for name in node.names]
     tops = [name.partition(".")[0] for name in names]
     return any(
         not top or (file.parent / top).is_dir() or (file.parent / f"{top}.py").exists() for top in tops

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.checks.findings import CheckedModel
-from volery.model.rules import RULES, Finding
+from volery.model.rules import RULES, BrokenRule
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
@@ -21,7 +21,7 @@ def sarif(checked: CheckedModel, model: Path) -> dict[str, Any]:
         checked: The findings.
         model: The model's file, the place of findings without a line.
     """
-    results = [_result(one, model) for one in checked.findings]
+    results = [_result(finding, model) for finding in checked.findings]
     results += [
         {**_result(one, model), "suppressions": [{"kind": "inSource", "justification": reason}]}
         for one, reason in checked.suppressed
@@ -32,7 +32,7 @@ def sarif(checked: CheckedModel, model: Path) -> dict[str, Any]:
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [{"tool": {"driver": driver}, "results": results}]}
 
 
-def _all(checked: CheckedModel) -> list[Finding]:
+def _all(checked: CheckedModel) -> list[BrokenRule]:
     return [*checked.findings, *(one for one, _ in checked.suppressed)]
 
 
@@ -49,7 +49,7 @@ def _rules(codes: Iterable[str]) -> list[dict[str, Any]]:
     ]
 
 
-def _result(finding: Finding, model: Path) -> dict[str, Any]:
+def _result(finding: BrokenRule, model: Path) -> dict[str, Any]:
     file = finding.where.file if finding.where is not None and finding.where.line else str(model)
     line = finding.where.line if finding.where is not None else 0
     place: dict[str, Any] = {"artifactLocation": {"uri": Path(file).as_posix()}}

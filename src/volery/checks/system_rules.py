@@ -13,13 +13,13 @@ from volery.cost import load_catalogue
 from volery.model import rules
 from volery.model.components import CPP_LANGUAGES
 from volery.model.instances import Instance
-from volery.model.rules import Finding
-from volery.model.system import Bound, Processor, System
+from volery.model.rules import BrokenRule
+from volery.model.system import ProcessorSpec, RequiredBound, System
 from volery.run.assembly.computers import commanded_by, is_node
 
 _SHARES = ("utilisation", "battery_min")
 
-Rule = Callable[[System], Iterator[Finding]]
+Rule = Callable[[System], Iterator[BrokenRule]]
 
 
 def instance_path(instance: Instance) -> str:
@@ -31,22 +31,22 @@ def instance_path(instance: Instance) -> str:
 # -- load, memory, deadlines
 
 
-def overload(system: System) -> Iterator[Finding]:
+def overload(system: System) -> Iterator[BrokenRule]:
     """Find processors whose stated work is more than all their cores can do."""
     try:
         shares = analyse(system).processors
     except (EstimateError, UsageError):  # no figures of a processor, or a name that ROS does not take
         return
-    for one in shares:
-        if one.share > 1.0:
-            processor = system.processor(one.resource)
-            what = (
-                f"its components need {one.share:.0%} of its {processor.cores} cores, by their longest times"
-            )
-            yield Finding(rules.OVERLOAD, what, f"platform.processors.{one.resource}", processor.where)
+    for share in shares:
+        if share.share > 1.0:
+            processor = system.processor(share.resource)
+            cores = f"{share.share:.0%} of its {processor.cores} cores"
+            what = f"its components need {cores}, by their longest times"
+            at = f"platform.processors.{share.resource}"
+            yield BrokenRule(rules.OVERLOAD, what, at, processor.where)
 
 
-def deadlines(system: System) -> Iterator[Finding]:
+def deadlines(system: System) -> Iterator[BrokenRule]:
     """Find deadlines that are later than the next release."""
     for instance in system.instances:
         activity = instance.activity
@@ -57,10 +57,10 @@ def deadlines(system: System) -> Iterator[Finding]:
                 f"the deadline of {to_seconds(activity.deadline_ns):g} s is after the next release, "
                 f"{to_seconds(activity.period_ns):g} s after the first"
             )
-            yield Finding(rules.DEADLINE_PERIOD, what, instance_path(instance), instance.where)
+            yield BrokenRule(rules.DEADLINE_PERIOD, what, instance_path(instance), instance.where)
 
 
-def memory(system: System) -> Iterator[Finding]:
+def memory(system: System) -> Iterator[BrokenRule]:
     """Find memory spaces and processors with less memory than their components take."""
     needed: dict[tuple[str, str], float] = defaultdict(float)
     for instance in system.instances:
@@ -70,32 +70,35 @@ def memory(system: System) -> Iterator[Finding]:
         if instance.processor is not None:
             needed["platform.processors", instance.processor] += size
     places: list[tuple[str, str, float | None, Location | None]] = [
-        *(("memory_spaces", one.name, one.memory_b, one.where) for one in system.memory_spaces),
-        *(("platform.processors", one.name, one.memory_b, one.where) for one in system.processors),
+        *(("memory_spaces", space.name, space.memory_b, space.where) for space in system.memory_spaces),
+        *(
+            ("platform.processors", processor.name, processor.memory_b, processor.where)
+            for processor in system.processors
+        ),
     ]
     for section, name, size_there, where in places:
         taken = needed[section, name]
         if size_there is not None and taken > size_there:
             what = f"its components take {taken / 1e6:g} MB, and it has {size_there / 1e6:g} MB"
-            yield Finding(rules.MEMORY_EXCEEDED, what, f"{section}.{name}", where)
+            yield BrokenRule(rules.MEMORY_EXCEEDED, what, f"{section}.{name}", where)
 
 
 # -- requirements
 
 
-def requirements(system: System) -> Iterator[Finding]:
+def requirements(system: System) -> Iterator[BrokenRule]:
     """Find requirements that no run can meet, that every run meets, or of which nothing is observed."""
     for bound in system.requirements:
         why = _unobserved(system, bound) or _unreachable(system, bound)
         if why:
-            yield Finding(rules.UNREACHABLE, why, f"requirements.{bound.name}", bound.where)
+            yield BrokenRule(rules.UNREACHABLE, why, f"requirements.{bound.name}", bound.where)
 
 
-def _unobserved(system: System, bound: Bound) -> str:
+def _unobserved(system: System, bound: RequiredBound) -> str:
     """Return why nothing can be observed of what a bound is about; empty if something can."""
     subject, _, quantity = bound.observe.rpartition(".")
     name, _, operation = subject.partition(".")
-    instance = next((one for one in system.instances if one.name == name), None)
+    instance = next((instance for instance in system.instances if instance.name == name), None)
     if instance is not None:
         of_calls = operation or quantity.startswith("call")
         return (
@@ -103,15 +106,19 @@ def _unobserved(system: System, bound: Bound) -> str:
         )
     if quantity in ("energy", "computing_energy"):
         return _without_power(
-            system, [one for one in system.processors if subject in (one.name, "application")]
+            system,
+            [processor for processor in system.processors if subject in (processor.name, "application")],
         )
-    network = next((one for one in system.networks if one.name == subject), None)
+    network = next((network for network in system.networks if network.name == subject), None)
     if network is not None and quantity.startswith("delay"):
-        places = {*(one.processor for one in system.instances), *(one.processor for one in system.vehicles)}
+        places = {
+            *(instance.processor for instance in system.instances),
+            *(vehicle.processor for vehicle in system.vehicles),
+        }
         used = places & {*network.between}
         if len(used) < 2:
             return f"nothing is sent over {network.name}: fewer than two of its processors execute anything"
-    if any(one.name == subject for one in system.vehicles) and quantity in _COMMANDED:
+    if any(vehicle.name == subject for vehicle in system.vehicles) and quantity in _COMMANDED:
         return _uncommanded(system, subject)
     return ""
 
@@ -123,7 +130,7 @@ _COMMANDED = ("landing_offset", "goto_error", "goto_error_vertical", "goto_error
 def _no_calls(system: System, instance: Instance, quantity: str) -> str:
     """Return why no call of an instance is observed; calls of ROS services are known when it runs."""
     targets = {
-        target.name for one in system.instances for connection in one.connections.values()
+        target.name for instance in system.instances for connection in instance.connections.values()
         for target in connection.targets
     }  # fmt: skip
     if instance.name in targets or is_node(instance) or quantity in ("calls", "failures"):
@@ -136,7 +143,9 @@ def _no_computing(system: System, instance: Instance, quantity: str) -> str:
     if quantity in ("cpu_time", "utilisation", "energy") and instance.processor is None:
         return f"{name} is allocated to no processor: its computing is not counted"
     if quantity == "energy":
-        return _without_power(system, [one for one in system.processors if one.name == instance.processor])
+        return _without_power(
+            system, [processor for processor in system.processors if processor.name == instance.processor]
+        )
     if quantity.startswith("response_time") and instance.activity is None:
         return _no_calls(system, instance, quantity)
     if quantity == "deadline_misses" and (instance.activity is None or instance.activity.deadline_ns is None):
@@ -146,19 +155,23 @@ def _no_computing(system: System, instance: Instance, quantity: str) -> str:
     return ""
 
 
-def _without_power(system: System, processors: list[Processor]) -> str:
+def _without_power(system: System, processors: list[ProcessorSpec]) -> str:
     catalogue = load_catalogue(*system.catalogues).processors
-    unknown = [f"{one.name} ({one.kind})" for one in processors if catalogue[one.kind].power is None]
+    unknown = [
+        f"{processor.name} ({processor.kind})"
+        for processor in processors
+        if catalogue[processor.kind].power is None
+    ]
     return f"nothing is known of the power of {choices(unknown)}: no energy is computed" if unknown else ""
 
 
 def _uncommanded(system: System, vehicle: str) -> str:
-    if any(vehicle in commanded_by(one) or is_node(one) for one in system.instances):
+    if any(vehicle in commanded_by(instance) or is_node(instance) for instance in system.instances):
         return ""
     return f"no component commands {vehicle}: it does not fly anywhere"
 
 
-def _unreachable(system: System, bound: Bound) -> str:
+def _unreachable(system: System, bound: RequiredBound) -> str:
     """Return why a bound is met by no run or by every run; empty if that depends on the run."""
     subject, _, quantity = bound.observe.rpartition(".")
     if bound.relation == "max" and bound.bound < 0.0:
@@ -171,7 +184,7 @@ def _unreachable(system: System, bound: Bound) -> str:
     return ""
 
 
-def _unreachable_minimum(system: System, bound: Bound, quantity: str) -> str:
+def _unreachable_minimum(system: System, bound: RequiredBound, quantity: str) -> str:
     orders = system.environment.workload
     most = orders.count if orders.rate_hz or orders.count else 0
     of_orders = bound.observe in ("application.delivered", "application.ordered")
@@ -188,7 +201,7 @@ def _unreachable_minimum(system: System, bound: Bound, quantity: str) -> str:
     return ""
 
 
-def _unreachable_times(system: System, instance: Instance, quantity: str, bound: Bound) -> str:
+def _unreachable_times(system: System, instance: Instance, quantity: str, bound: RequiredBound) -> str:
     if instance.activity is None or not quantity.startswith("response_time") or instance.processor is None:
         return ""
     processor = system.processor(instance.processor)
@@ -204,12 +217,14 @@ def _unreachable_times(system: System, instance: Instance, quantity: str, bound:
 # -- this machine
 
 
-def tool_chains(system: System) -> Iterator[Finding]:
+def tool_chains(system: System) -> Iterator[BrokenRule]:
     """Find languages whose compiler is not on this machine."""
-    for component in {one.component.name: one.component for one in system.instances}.values():
+    for component in {instance.component.name: instance.component for instance in system.instances}.values():
         if component.path and component.language in CPP_LANGUAGES and not has_compiler():
             what = f"no C++ compiler is installed: {COMPILER_HINT}"
-            yield Finding(rules.NO_TOOL_CHAIN, what, f"components.{component.name}.language", component.where)
+            yield BrokenRule(
+                rules.NO_TOOL_CHAIN, what, f"components.{component.name}.language", component.where
+            )
 
 
 SYSTEM_RULES: tuple[Rule, ...] = (overload, deadlines, memory, requirements, tool_chains)

@@ -6,9 +6,9 @@ object for each noun. ``volery.cli.main`` finds all of them, so a new command ch
 the library inside their functions: ``volery --help`` imports all of them and must stay quick. A command
 imports the files that begin with its first word, such as ``cost.py`` and ``cost_calibrate.py``, and no other.
 
-A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
-control the output (``--quiet``, ``--json``, ``--debug``) are added here. Options that several commands share
-are the fields of a dataclass: a parameter with that type stands for all of them.
+A command is a function of a ``CommandOutput`` and of its options, and returns its exit status. The options
+that control the output (``--quiet``, ``--json``, ``--debug``) are added here. Options that several commands
+share are the fields of a dataclass: a parameter with that type stands for all of them.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from volery.base.errors import (
 )
 from volery.base.installed import missing_extra
 from volery.base.process import interrupted_by_signals
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import Debug, Json, Quiet
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Noun(TyperGroup):
 
     def _are_of(self, own: Any, args: list[str], *, completing: bool) -> bool:
         if not args:
-            return not completing and not any(one.required for one in own.params)
+            return not completing and not any(param.required for param in own.params)
         word = args[0]
         misspelt = word.isalpha() and did_you_mean(word, self.commands) and not Path(word).exists()
         return not misspelt and word not in {*self.commands, *HELP}
@@ -153,9 +153,9 @@ class Commands:
 
 def _below(app: typer.Typer, noun: str) -> typer.Typer:
     """Return the part of *app* for what stands below *noun*, a new one if there is none."""
-    for one in app.registered_groups:
-        if one.name == noun and one.typer_instance is not None:
-            return one.typer_instance
+    for group in app.registered_groups:
+        if group.name == noun and group.typer_instance is not None:
+            return group.typer_instance
     made = typer.Typer(cls=Noun, no_args_is_help=True)
     app.add_typer(made, name=noun, rich_help_panel=HEADINGS[1] if app.info.callback else None)
     return made
@@ -167,7 +167,11 @@ def _command_line_function(
     """Return *function* as Typer calls it: output options for its ``output``, fields for its dataclasses."""
     signature = inspect.signature(function, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY
-    stated = [one.replace(kind=keyword) for one in signature.parameters.values() if one.name != "output"]
+    stated = [
+        parameter.replace(kind=keyword)
+        for parameter in signature.parameters.values()
+        if parameter.name != "output"
+    ]
     groups = {
         one.name: one.annotation
         for one in stated
@@ -178,7 +182,7 @@ def _command_line_function(
     own += [member.replace(kind=keyword) for shared in members.values() for member in shared.values()]
 
     def call(**arguments: Any) -> None:
-        output = Output(**{option: arguments.pop(option) for option in options})
+        output = CommandOutput(**{option: arguments.pop(option) for option in options})
         for name, group in groups.items():
             arguments[name] = group(**{member: arguments.pop(member) for member in members[name]})
         raise typer.Exit(exit_status(output, lambda: function(output, **arguments)))
@@ -191,12 +195,12 @@ def _command_line_function(
     ]
     parameters = own + added
     call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # read by inspect.signature
-    call.__annotations__ = {one.name: one.annotation for one in parameters}
+    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     call.__doc__ = function.__doc__
     return call
 
 
-def exit_status(output: Output, command: Callable[[], int]) -> int:
+def exit_status(output: CommandOutput, command: Callable[[], int]) -> int:
     """Call *command* and return its exit status; an exception becomes a message and a status.
 
     SIGTERM and SIGHUP end every command as Ctrl-C does, unless it takes them itself.

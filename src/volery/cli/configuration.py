@@ -155,10 +155,10 @@ def _of_group(group: TyperGroup, stated: dict[str, Any], where: str) -> dict[str
 
 def _of_command(command: Any, table: dict[str, Any], where: str) -> dict[str, Any]:
     options = {
-        text.lstrip("-"): one
-        for one in command.params
-        if isinstance(one, TyperOption)
-        for text in (*one.opts, *one.secondary_opts)
+        text.lstrip("-"): param
+        for param in command.params
+        if isinstance(param, TyperOption)
+        for text in (*param.opts, *param.secondary_opts)
         if text.startswith("--")
     }
     found: dict[str, Any] = {}

@@ -55,7 +55,7 @@ class _PrintableOnly(RenderHook):
     """Names and texts of models, vehicles and recordings reach the terminal without control characters."""
 
     def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
-        return [_Printable(one) for one in renderables]
+        return [_Printable(renderable) for renderable in renderables]
 
 
 def _console(*, stderr: bool = False) -> Console:
@@ -63,15 +63,15 @@ def _console(*, stderr: bool = False) -> Console:
 
     Names and messages of others may hold what Rich takes for markup (``[bold]``) or an emoji (``:100:``).
     """
-    made = Console(stderr=stderr, markup=False, emoji=False)
-    made.push_render_hook(_PrintableOnly())
-    return made
+    console = Console(stderr=stderr, markup=False, emoji=False)
+    console.push_render_hook(_PrintableOnly())
+    return console
 
 
 def make_table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
     """Return a table in the style of all commands. A narrow terminal folds texts and cuts nothing off."""
     return Table(
-        *(Column(one, overflow="fold") if isinstance(one, str) else one for one in headings),
+        *(Column(heading, overflow="fold") if isinstance(heading, str) else heading for heading in headings),
         title=title,
         title_justify="left",
         title_style="bold",
@@ -92,7 +92,7 @@ def number_column(heading: str) -> Column:
 
 
 @dataclass(frozen=True)
-class Output:
+class CommandOutput:
     """Output of one command, as its options ``--quiet``, ``--json`` and ``--debug`` choose it."""
 
     quiet: bool = False

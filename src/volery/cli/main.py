@@ -21,7 +21,7 @@ from volery.base.process import outlive_output
 from volery.cli import commands
 from volery.cli.command import BAD_INPUT, FAILED, FIRST_HOUR, HELP, Commands
 from volery.cli.configuration import Configuration, read_configuration
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.old_names import QUIET, current_words
 
 ROS_ARGUMENTS = "--ros-args"
@@ -61,7 +61,7 @@ def application(word: str = "") -> typer.Typer:
         rich_markup_mode="markdown",
         context_settings={"help_option_names": list(HELP)},
     )
-    files = [one.name for one in iter_modules(commands.__path__)]
+    files = [module.name for module in iter_modules(commands.__path__)]
     own = [file for file in files if file.split("_")[0] == word]
     found = [one for file in own for one in _declared(file)]
     if not any(one.has(word) for one in found):
@@ -93,23 +93,23 @@ def main() -> None:
     if ROS_ARGUMENTS in words and "--" not in words:  # ros2 launch adds them, and they are no options
         words.insert(words.index(ROS_ARGUMENTS), "--")
     if remark:
-        Output(quiet=not QUIET.isdisjoint(words)).note(remark)
+        CommandOutput(quiet=not QUIET.isdisjoint(words)).note(remark)
     informs = not INFORMATION.isdisjoint(words)
     command = typer.main.get_command(application(next(iter(words), "")))
     configuration = Configuration()
     try:
         configuration = read_configuration(application, Path.cwd())
     except (UsageError, OSError) as error:
-        Output().complain(f"volery: {error}")
+        CommandOutput().complain(f"volery: {error}")
         if words and not informs:
             raise SystemExit(BAD_INPUT) from None
     if not informs:
         for line in configuration.said(words):
-            Output().note(line)
+            CommandOutput().note(line)
     try:
         command(words, prog_name="volery", default_map=configuration.defaults)
     finally:
         sys.stdout.flush()
         if printed is not None and printed.problem:
-            Output().complain(f"volery: standard output cannot be written: {printed.problem}")
+            CommandOutput().complain(f"volery: standard output cannot be written: {printed.problem}")
             raise SystemExit(FAILED)

@@ -19,13 +19,13 @@ from rich.text import Text
 from volery.base.errors import UsageError
 from volery.base.time import clock, to_seconds
 from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.report.grids import by_state, plural
 from volery.report.terminal import summary_table
 from volery.requirements.record import RunRecord
 from volery.run.event_log import LogOptions, parse_level
 from volery.run.recording import make_folder
-from volery.run.result import FULL, NOTHING, SUMMARY, TRACE, Progress, Run, check_record
+from volery.run.result import FULL, NOTHING, SUMMARY, TRACE, Run, RunProgress, check_record
 
 DRAWING_PERIOD_S = 0.1
 """Wall seconds between two drawings: to draw takes longer than to simulate one second."""
@@ -33,13 +33,13 @@ DRAWING_PERIOD_S = 0.1
 LINE_PERIOD_S = 10.0
 """Wall seconds between two lines of a run where no terminal can be drawn on, such as a log of CI."""
 
-Show = Callable[[Progress], None]
+Show = Callable[[RunProgress], None]
 
 
 class Drawings(Protocol):
     """Shows the progress of one or several runs."""
 
-    def show(self, title: str, progress: Progress) -> None:
+    def show(self, title: str, progress: RunProgress) -> None:
         """Show the progress of the run called *title*."""
 
 
@@ -50,7 +50,7 @@ class RateLimited:
         self._show = show
         self._next = 0.0
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: RunProgress) -> None:
         """Show *progress* if the last drawing is old enough."""
         now = perf_counter()
         if now >= self._next:
@@ -66,7 +66,7 @@ class LiveProgress:
         self._start = perf_counter()
         self._drawn: dict[str, RenderableType] = {}
 
-    def show(self, title: str, progress: Progress) -> None:
+    def show(self, title: str, progress: RunProgress) -> None:
         """Redraw the run called *title*."""
         self._drawn[title] = draw_progress(title, progress, perf_counter() - self._start)
         self._live.update(Group(*self._drawn.values()))
@@ -75,13 +75,13 @@ class LiveProgress:
 class LineProgress:
     """Lines of text for one or several runs, where no terminal can be drawn on."""
 
-    def __init__(self, output: Output, read_clock: Callable[[], float] = perf_counter) -> None:
+    def __init__(self, output: CommandOutput, read_clock: Callable[[], float] = perf_counter) -> None:
         self._output = output
         self._clock = read_clock
         self._start = read_clock()
         self._last: dict[str, float] = {}
 
-    def show(self, title: str, progress: Progress) -> None:
+    def show(self, title: str, progress: RunProgress) -> None:
         """Print a line if the last one of the run called *title* is old enough."""
         now = self._clock()
         if now - self._last.get(title, self._start) < LINE_PERIOD_S:
@@ -93,12 +93,12 @@ class LineProgress:
         self._output.note(f"{title}: {clock(progress.now)[:-4]}{of}, {pace:,.1f}× real time{noted}")
 
 
-def _noted(progress: Progress) -> list[str]:
+def _noted(progress: RunProgress) -> list[str]:
     """Return how many subjects of notes are in each state: ``parcels: 2 delivered``."""
     return [f"{plural(kind)}: {by_state(states)}" for kind, states in progress.notes.items()]
 
 
-def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableType:
+def draw_progress(title: str, progress: RunProgress, wall_s: float) -> RenderableType:
     """Return one line for the run and one for each vehicle."""
     simulated = to_seconds(progress.now)
     line = Text(f"{title}  ", style="bold")
@@ -108,16 +108,16 @@ def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableTy
     noted = ", ".join(_noted(progress))
     line.append(f"  {noted}" if noted else "")
     vehicles = Table.grid(padding=(0, 2))
-    for one in progress.vehicles:
-        height = f"{one.height:.1f} m" if one.armed else "on the ground"
-        vehicles.add_row(f"  {one.name}", one.mode, "armed" if one.armed else "", height)
+    for vehicle in progress.vehicles:
+        height = f"{vehicle.height:.1f} m" if vehicle.armed else "on the ground"
+        vehicles.add_row(f"  {vehicle.name}", vehicle.mode, "armed" if vehicle.armed else "", height)
     if not progress.limit:
         return Group(line, vehicles)
     return Group(line, ProgressBar(total=progress.limit, completed=progress.now, width=40), vehicles)
 
 
 @contextmanager
-def live_progress(output: Output) -> Iterator[Drawings | None]:
+def live_progress(output: CommandOutput) -> Iterator[Drawings | None]:
     """Draw on the terminal within the context, or print lines; yield None if progress is not shown."""
     if output.quiet:
         yield None
@@ -130,14 +130,14 @@ def live_progress(output: Output) -> Iterator[Drawings | None]:
 
 
 @contextmanager
-def run_progress(output: Output, title: str) -> Iterator[Show | None]:
+def run_progress(output: CommandOutput, title: str) -> Iterator[Show | None]:
     """Yield the function to which one run reports its progress, or None if it is not shown."""
     with live_progress(output) as drawings:
         yield None if drawings is None else RateLimited(partial(drawings.show, title))
 
 
 @contextmanager
-def status_line(output: Output) -> Iterator[Callable[[str], None]]:
+def status_line(output: CommandOutput) -> Iterator[Callable[[str], None]]:
     """Yield what shows one line that is renewed on a terminal; elsewhere a line each ``LINE_PERIOD_S``."""
     if output.shows_progress:
         with Live(console=output.notes, transient=True, refresh_per_second=4) as live:
@@ -219,7 +219,7 @@ def read_log_options(file: Path | None, level: str) -> LogOptions | None:
     return None if file is None else LogOptions(file, severity)
 
 
-def show_outcome(output: Output, run: Run) -> int:
+def show_outcome(output: CommandOutput, run: Run) -> int:
     """Show a finished run and where it is kept. Return the exit status."""
     output.show(summary_table(run.record))
     output.give(run.record.model_dump_json(by_alias=True, indent=2))
@@ -248,10 +248,10 @@ def show_outcome(output: Output, run: Run) -> int:
 
 def unmet(record: RunRecord, name: str) -> str:
     """Return one sentence about a requirement that was not met."""
-    found = record.requirements[name]
-    bound = f"{found.relation} {found.bound:g} {found.unit}".strip()
-    value = "" if found.observed is None else f"{found.observed:g} {found.unit}".strip()
-    chain = record.chains.get(found.observable.rpartition(".")[0])
+    requirement = record.requirements[name]
+    bound = f"{requirement.relation} {requirement.bound:g} {requirement.unit}".strip()
+    value = "" if requirement.observed is None else f"{requirement.observed:g} {requirement.unit}".strip()
+    chain = record.chains.get(requirement.observable.rpartition(".")[0])
     why = f" ({chain.unobserved})" if chain is not None and chain.unobserved else ""
     seen = f"is {value}" if value else f"was never observed{why}"
-    return f"the requirement {name!r} is not met: {found.observable} {seen}, required is {bound}"
+    return f"the requirement {name!r} is not met: {requirement.observable} {seen}, required is {bound}"

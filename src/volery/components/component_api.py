@@ -10,7 +10,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
-from volery.components.instance import ComponentContext, Instance
+from volery.components.instance import ComponentContext, RunningInstance
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
@@ -42,7 +42,7 @@ def caller(what: str) -> tuple[Kernel, Task]:
     raise UsageError(f"{what} works in a component or a mission of a run only")
 
 
-def component_of(task: Task) -> Instance | None:
+def component_of(task: Task) -> RunningInstance | None:
     """Return the component whose code ``task`` executes now; None for a mission or a script."""
     context = task.context
     return context.instance if isinstance(context, ComponentContext) else None

@@ -58,9 +58,9 @@ def entry_function(source: SourceFile) -> str:
     folders = (source.path.parent, *source.path.resolve().parents[1 : _LEVELS + 1])
     for folder in folders:
         functions = [
-            one.function
-            for one in entry_points(folder)
-            if one.is_in(source.path) and source.defines(one.function)
+            point.function
+            for point in entry_points(folder)
+            if point.is_in(source.path) and source.defines(point.function)
         ]
         if functions:
             return "main" if "main" in functions else functions[0]
@@ -180,7 +180,7 @@ def find_executable(
     for candidate in (name, f"{name}.py"):
         if candidate in files:
             return Executable(files[candidate], "")
-    known = sorted({*(one.name for one in points), *files})
+    known = sorted({*(point.name for point in points), *files})
     raise UsageError(f"package {package} has no executable {name!r}; there is {choices(known)}")
 
 

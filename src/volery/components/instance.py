@@ -78,10 +78,10 @@ class Allocation:
 class ComponentContext(ExecutionContext):
     """An execution context with its instance, so that calls of component code find their component."""
 
-    instance: Instance = field(kw_only=True)
+    instance: RunningInstance = field(kw_only=True)
 
 
-class Instance:
+class RunningInstance:
     """One component of the application or of its environment.
 
     Args:

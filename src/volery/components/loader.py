@@ -30,7 +30,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError, did_you_mean
-from volery.components.instance import COMPONENT_MARK, Instance, describe
+from volery.components.instance import COMPONENT_MARK, RunningInstance, describe
 from volery.components.polling import Polling, empty_turns, has_busy_loop
 from volery.components.virtual_stdlib.process_modules import ProcessModules
 from volery.cost import StepCounter
@@ -216,7 +216,7 @@ def imported_names(file: Path) -> set[str]:
     found: set[str] = set()
     for node in ast.walk(parse(file).tree):
         if isinstance(node, ast.Import):
-            found.update(one.name.partition(".")[0] for one in node.names)
+            found.update(name.name.partition(".")[0] for name in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             found.add(node.module.partition(".")[0])
     return found
@@ -225,10 +225,10 @@ def imported_names(file: Path) -> set[str]:
 def _imports_of(file: Path) -> Iterator[Path]:
     for node in ast.walk(parse(file).tree):
         if isinstance(node, ast.Import):
-            names = [(file.parent, one.name) for one in node.names]
+            names = [(file.parent, name.name) for name in node.names]
         elif isinstance(node, ast.ImportFrom):
             folder = file.parents[node.level - 1] if node.level else file.parent
-            below = [f"{node.module}.{one.name}" if node.module else one.name for one in node.names]
+            below = [f"{node.module}.{name.name}" if node.module else name.name for name in node.names]
             names = [(folder, name) for name in (node.module, *below) if name]
         elif isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in _DYNAMIC_IMPORTS:
             yield from sorted(file.parent.glob("*.py"))
@@ -251,7 +251,7 @@ def _module_files(folder: Path, name: str) -> Iterator[Path]:
         yield module
 
 
-class Host:
+class ScriptHost:
     """What a script reaches of its run when it ends. This one reaches nothing."""
 
     def at_end(self, context: ExecutionContext, last: Callable[[], object]) -> None:
@@ -287,7 +287,7 @@ class Loader:
     polling: Polling | None = None
     libraries: set[str] = field(default_factory=set)
     workspace: Workspace = field(default_factory=Workspace)
-    host: Host = field(default_factory=Host)
+    host: ScriptHost = field(default_factory=ScriptHost)
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
@@ -520,7 +520,7 @@ class ScriptSpace(Space):
     def __init__(
         self,
         loader: Loader,
-        instance: Instance,
+        instance: RunningInstance,
         source: SourceFile,
         arguments: Sequence[str] = (),
         library: Library = "",
@@ -624,7 +624,7 @@ class ScriptSpace(Space):
         if top not in self._uses_ros:
             self._uses_ros[top] = False  # while its own imports are followed
             files = file.parent.rglob("*.py") if file.name == "__init__.py" else (file,)
-            names = {name for one in files for name in _IMPORTED.findall(_text_of(one))}
+            names = {name for file in files for name in _IMPORTED.findall(_text_of(file))}
             self._uses_ros[top] = any(self._is_ros(name) for name in names)
         return self._uses_ros[top] and _RELAY not in _text_of(file)
 
@@ -650,13 +650,13 @@ def _text_of(path: Path) -> str:
 
 
 def _python_path() -> list[Path]:
-    return [Path(one) for one in os.environ.get("PYTHONPATH", "").split(os.pathsep) if one]
+    return [Path(word) for word in os.environ.get("PYTHONPATH", "").split(os.pathsep) if word]
 
 
 def _is_library(name: str, module: ModuleType | None) -> bool:
     """Return whether a package has more than interfaces, as ``actionlib``, a client library with messages."""
     names = () if module is None or _interface_kind(name) else vars(module)
-    return any(not one.startswith("_") and one not in KINDS for one in names)
+    return any(not name.startswith("_") and name not in KINDS for name in names)
 
 
 def _interface_kind(name: str) -> bool:
@@ -761,7 +761,9 @@ class _Import:
         raise ModuleNotFoundError(f"No module named {missing!r}: {why}", name=missing)
 
     def _missing_below(self, top: str, name: str) -> str:
-        below = [one for one in self._loader.replacements if one.startswith(f"{top}.")]
+        below = [
+            replacement for replacement in self._loader.replacements if replacement.startswith(f"{top}.")
+        ]
         hint, instead = did_you_mean(name, below), ""
         try:
             getattr(self._loader.replacements[top], name.partition(".")[2])

@@ -8,7 +8,7 @@ from pathlib import Path
 from volery.base.errors import UsageError
 from volery.components.cpp.sources import executables
 from volery.components.entry_points import entry_points, find_executable
-from volery.exchange.launch.launch_reading import Program
+from volery.exchange.launch.launch_reading import ProgramSource
 from volery.ros.messages.workspace import Workspace
 
 ROS_2 = 2
@@ -25,14 +25,14 @@ class PackageSearch:
         found = self._workspace.find(package, near)
         return None if found is None else found.folder
 
-    def program(self, package: str, executable: str, near: Path, ros: int) -> Program | None:
+    def program(self, package: str, executable: str, near: Path, ros: int) -> ProgramSource | None:
         """Return the source of a program of a package for a version of ROS, or None."""
         for cpp, language in ((False, ("rospy", "rclpy")), (True, ("roscpp", "rclcpp"))):
             try:
                 found = find_executable(self._workspace, package, executable, near, cpp=cpp)
             except UsageError:
                 continue
-            return Program(found.file, language[ros - 1], found.function)
+            return ProgramSource(found.file, language[ros - 1], found.function)
         return None
 
     def package_of(self, file: Path) -> tuple[str, Path] | None:
@@ -50,5 +50,5 @@ class PackageSearch:
             built = executables(package)
             names = [name for name, source in built.items() if source.resolve() == file.resolve()]
         elif ros == ROS_2:
-            names = [one.name for one in entry_points(package.folder) if one.is_in(file)]
+            names = [point.name for point in entry_points(package.folder) if point.is_in(file)]
         return package.name, (names or [file.name])[0]

@@ -16,7 +16,7 @@ from typing import Any, NoReturn, TypeVar, overload
 
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.position import Position
-from volery.components.instance import Instance
+from volery.components.instance import RunningInstance
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
 from volery.trace.events import Call
@@ -30,7 +30,7 @@ HEADER_BYTES = 64
 """Bytes added to each direction of a call: TCP/IP headers (40) and the operation's name with framing."""
 
 
-class Port:
+class ComponentPort:
     """A required port: ``port.operation(...)`` calls the component at the other end.
 
     The call raises the callee's exception if it is one of the project's errors, else a ``ComponentError``
@@ -41,7 +41,7 @@ class Port:
         self,
         kernel: Kernel,
         caller: str,
-        callee: Instance,
+        callee: RunningInstance,
         request: Transfer | None,
         reply: Transfer | None,
     ) -> None:
@@ -117,9 +117,9 @@ class Port:
 
 
 def invoke(
-    callee: Instance, thing: object, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+    callee: RunningInstance, thing: object, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> Any:
-    """Return the result of an operation of ``callee``, whose object is ``thing``. See ``Port`` for errors."""
+    """Return the result of an operation of *callee*, whose object is ``thing``; errors: ``ComponentPort``."""
     try:
         return getattr(thing, operation)(*args, **kwargs)
     except VoleryError:
@@ -128,14 +128,14 @@ def invoke(
         raise callee.component_error(error, operation) from error
 
 
-class PortList(Sequence[Port]):
+class PortList(Sequence[ComponentPort]):
     """A required port that is connected to several components, in the order of the model.
 
     An element is accessed by index or by the name of the component at the other end: ``drones[0]``,
     ``drones["drone_control_2"]``.
     """
 
-    def __init__(self, ports: Sequence[Port]) -> None:
+    def __init__(self, ports: Sequence[ComponentPort]) -> None:
         self._ports = tuple(ports)
         self._by_name = {port.component: port for port in self._ports}
 
@@ -145,10 +145,10 @@ class PortList(Sequence[Port]):
         return tuple(self._by_name)
 
     @overload
-    def __getitem__(self, which: int | str) -> Port: ...
+    def __getitem__(self, which: int | str) -> ComponentPort: ...
     @overload
-    def __getitem__(self, which: slice) -> Sequence[Port]: ...
-    def __getitem__(self, which: int | str | slice) -> Port | Sequence[Port]:
+    def __getitem__(self, which: slice) -> Sequence[ComponentPort]: ...
+    def __getitem__(self, which: int | str | slice) -> ComponentPort | Sequence[ComponentPort]:
         if isinstance(which, str):
             if which not in self._by_name:
                 hint = did_you_mean(which, self._by_name)
@@ -159,7 +159,7 @@ class PortList(Sequence[Port]):
     def __len__(self) -> int:
         return len(self._ports)
 
-    def __iter__(self) -> Iterator[Port]:
+    def __iter__(self) -> Iterator[ComponentPort]:
         return iter(self._ports)
 
 
@@ -190,7 +190,7 @@ def _parts(value: object) -> Iterable[object] | None:
     return list(state.values()) if state else None
 
 
-class ObservedVehicle:
+class TrueVehicle:
     """The true state of a vehicle, for components of the environment such as a beacon or an obstacle.
 
     A component of the application commands the vehicle instead, and receives its autopilot's estimate.

@@ -18,7 +18,7 @@ from volery.base.errors import Location, ModelError, choices, did_you_mean
 from volery.base.time import Ns
 from volery.components.component_api import caller, component_of, register_kernel
 from volery.components.entry_points import entry_function
-from volery.components.instance import Instance, OnFailure
+from volery.components.instance import OnFailure, RunningInstance
 from volery.components.loader import Loader, ScriptSpace, SourceFile, parse
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope, Task
@@ -30,7 +30,7 @@ ENTRY = "main"
 """The usual name of the function that an entry point calls."""
 
 
-class Program(Protocol):
+class InstanceProgram(Protocol):
     """Makes and runs the object of an instance."""
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
@@ -57,7 +57,7 @@ class ClassProgram:
         self._source = source
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         self._check_arguments(list(given))
         for operation in operations:
             if not callable(getattr(self._class, operation, None)):
@@ -131,11 +131,11 @@ class ClassProgram:
         )
 
     def make(self, given: Mapping[str, Any]) -> object:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         return self._class(**given)
 
     def run(self, thing: object) -> None:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         getattr(thing, RUN)()
 
 
@@ -169,7 +169,7 @@ class ScriptProgram:
         self._function = function
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """See ``Program``: a script takes no arguments and provides no operations."""
+        """See ``InstanceProgram``: a script takes no arguments and provides no operations."""
         where = Location(str(self._source.path), 1)
         for name in given:
             raise ModelError(
@@ -192,11 +192,11 @@ class ScriptProgram:
             )
 
     def make(self, given: Mapping[str, Any]) -> object:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         return self
 
     def run(self, thing: object) -> None:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         instance = component_of(caller("a script")[1])
         assert instance is not None, "a script runs in the flow of control of its component"
         space = ScriptSpace(self._loader, instance, self._source, self._arguments, self._library)
@@ -213,7 +213,7 @@ def load_program(
     arguments: Sequence[str] = (),
     function: str = "",
     library: Library = "",
-) -> Program:
+) -> InstanceProgram:
     """Load the program of an instance.
 
     Args:
@@ -293,7 +293,11 @@ def _require_class(source: SourceFile, class_name: str) -> None:
 
 
 def start(
-    instance: Instance, program: Program, given: Mapping[str, Any], scope: Scope, failed: OnFailure
+    instance: RunningInstance,
+    program: InstanceProgram,
+    given: Mapping[str, Any],
+    scope: Scope,
+    failed: OnFailure,
 ) -> Task:
     """Start an instance: construct its object and, if it is active, run it.
 

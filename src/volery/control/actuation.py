@@ -24,7 +24,7 @@ from volery.control.vehicle_answer import (
     PREDICTED_WITHIN_S,
     TILT_ANSWERS,
     VELOCITY_ANSWERS,
-    Answer,
+    LoopAnswer,
     answer_of,
 )
 from volery.trace.events import WARNING, Text
@@ -34,7 +34,7 @@ from volery.vehicles.telemetry import HALF_US, MIDDLE_US, Attitude
 GRAVITY = 9.80665
 
 
-class Command(NamedTuple):
+class MotionCommand(NamedTuple):
     """Velocity over ground in m/s and turn rate in degrees/s, clockwise positive."""
 
     north: float = 0.0
@@ -43,7 +43,7 @@ class Command(NamedTuple):
     yaw_rate: float = 0.0
 
 
-class Measured(NamedTuple):
+class MeasuredState(NamedTuple):
     """What a law sees: heading in degrees, position in m about home, velocity in m/s; NaN where unknown.
 
     ``lead`` is the turn in degrees that is still to come by the commands already given.
@@ -68,8 +68,8 @@ class Actuation(Protocol):
         return 0.0
 
     @property
-    def answer(self) -> Answer | None:
-        """How the vehicle answers commands; ``None`` where they have other units than ``Command``."""
+    def answer(self) -> LoopAnswer | None:
+        """How the vehicle answers commands; ``None`` where they have other units than ``MotionCommand``."""
         return None
 
     def take_off(self, height: float) -> None:
@@ -78,7 +78,7 @@ class Actuation(Protocol):
     def engage(self) -> None:
         """Take control in the air."""
 
-    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+    def apply(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> None:
         """Send one command."""
 
 
@@ -89,7 +89,7 @@ def _turn_model(drone: Drone, scale: RcScale | None = None) -> TurnModel | None:
     return None if scale is None or rare else scale.turning
 
 
-def _answer(answers: Mapping[str, Answer], drone: Drone, model: TurnModel | None) -> Answer:
+def _answer(answers: Mapping[str, LoopAnswer], drone: Drone, model: TurnModel | None) -> LoopAnswer:
     """Return the answer of the drone's autopilot; with a *model* its turns are predicted."""
     answer = answer_of(answers, drone.telemetry.autopilot)
     return answer if model is None else answer._replace(turn=PREDICTED)
@@ -113,7 +113,7 @@ class VelocitySetpoints(Actuation):
         return self._turning.lead
 
     @property
-    def answer(self) -> Answer | None:
+    def answer(self) -> LoopAnswer | None:
         """How the autopilot follows velocities."""
         return _answer(VELOCITY_ANSWERS, self._drone, _turn_model(self._drone))
 
@@ -127,7 +127,7 @@ class VelocitySetpoints(Actuation):
         self._drone.hold()
         self._turning = TurnPrediction(_turn_model(self._drone))
 
-    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+    def apply(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> None:
         """Send a velocity and a turn rate."""
         self._turning.command(command.yaw_rate, sample_s)
         self._drone.set_velocity(*command, lasting=self._lasting)
@@ -254,7 +254,9 @@ class _TiltLoop:
         for law, acceleration in zip(self._laws, turn_clockwise((ahead, right), heading), strict=True):
             law.begin_at(acceleration)
 
-    def tilt(self, command: Command, measured: Measured, sample_s: float, most: float) -> tuple[float, float]:
+    def tilt(
+        self, command: MotionCommand, measured: MeasuredState, sample_s: float, most: float
+    ) -> tuple[float, float]:
         """Return tilt forward and to the right in degrees, each at most *most*."""
         if self._laws is None or isnan(measured.velocity_north) or isnan(measured.heading):
             return 0.0, 0.0
@@ -301,7 +303,7 @@ class RcOverride(Actuation):
         return self._turning.lead
 
     @property
-    def answer(self) -> Answer | None:
+    def answer(self) -> LoopAnswer | None:
         """How the drone follows velocities by its sticks; ``None`` with channels of another scale."""
         drone, scale = self._drone, self.scale
         if scale is not RC_SCALES.get(drone.telemetry.autopilot):
@@ -340,7 +342,7 @@ class RcOverride(Actuation):
         self._drone.manual_control(0.0, 0.0, 0.5, 0.0)
         self._drone.altitude_hold()
 
-    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+    def apply(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> None:
         """Send the stick positions of a command."""
         scale = self.scale
         forward, right = self._loop.tilt(command, measured, sample_s, scale.most_tilt)
@@ -391,7 +393,7 @@ class AttitudeSetpoints(Actuation):
         self._thrust = PidLaw(THRUST_GAINS)
 
     @property
-    def answer(self) -> Answer | None:
+    def answer(self) -> LoopAnswer | None:
         """How the drone follows velocities by its attitude."""
         return _answer(TILT_ANSWERS, self._drone, None)
 
@@ -406,7 +408,7 @@ class AttitudeSetpoints(Actuation):
         self._loop.reset(self._drone.telemetry.attitude)
         self._thrust.reset()
 
-    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+    def apply(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> None:
         """Send an attitude, a thrust and a turn rate."""
         forward, right = self._loop.tilt(command, measured, sample_s, MOST_TILT)
         by_rate = CLIMBS_BY_THRUST.get(self._drone.telemetry.autopilot.partition(" ")[0])

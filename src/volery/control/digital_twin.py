@@ -17,10 +17,10 @@ import numpy as np
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
-from volery.control.actuation import Command, Measured
+from volery.control.actuation import MeasuredState, MotionCommand
 from volery.control.laws import DEGREES, Law, PidGains, PidLaw, wrap
-from volery.control.manoeuvres import LoopSample, Manoeuvre
-from volery.control.step_response import Array, Signal
+from volery.control.manoeuvres import LawManoeuvre, LoopSample
+from volery.control.step_response import Array, ControlledSignal
 from volery.vehicles import Drone
 
 FOLLOW_GAINS = PidGains(kp=0.9, low=-8.0, high=8.0, deceleration=1.2)
@@ -32,7 +32,7 @@ SLOPE_S = 0.4
 """Time over which velocities of a record and turn rates are differences, s."""
 
 
-class Reference(NamedTuple):
+class TwinReference(NamedTuple):
     """Where the reference is: heading in degrees, m about its home, m/s; NaN where unknown."""
 
     heading: float
@@ -45,7 +45,7 @@ class Reference(NamedTuple):
     turn_rate: float = 0.0
 
 
-Follow = Callable[[float], Reference | None]
+Follow = Callable[[float], TwinReference | None]
 """Returns the reference at a time in s since the twin follows; ``None`` at its end."""
 
 
@@ -72,7 +72,7 @@ class RecordedReference:
         """Duration, s."""
         return float(self.times[-1] - self.times[0])
 
-    def __call__(self, elapsed: float) -> Reference | None:
+    def __call__(self, elapsed: float) -> TwinReference | None:
         """Return the interpolated reference with velocities from differences."""
         if elapsed > self.duration:
             return None
@@ -82,14 +82,14 @@ class RecordedReference:
             return float(np.interp(moment, self.times, column))
 
         columns = (self.heading, self.north, self.east, self.up)
-        heading, north, east, up = (value(one, at) for one in columns)
+        heading, north, east, up = (value(column, at) for column in columns)
         ends = self.times[0], self.times[-1]
         first, last = max(ends[0], at - SLOPE_S / 2.0), min(ends[1], at + SLOPE_S / 2.0)
-        turn, *rates = ((value(one, last) - value(one, first)) / (last - first) for one in columns)
-        return Reference(heading, north, east, up, rates[0], rates[1], rates[2], turn)
+        turn, *rates = ((value(column, last) - value(column, first)) / (last - first) for column in columns)
+        return TwinReference(heading, north, east, up, rates[0], rates[1], rates[2], turn)
 
 
-def recorded_reference(signals: Sequence[Signal]) -> RecordedReference:
+def recorded_reference(signals: Sequence[ControlledSignal]) -> RecordedReference:
     """Return the flight that a record contains.
 
     Args:
@@ -120,7 +120,7 @@ def recorded_reference(signals: Sequence[Signal]) -> RecordedReference:
     return RecordedReference(times[part], columns["yaw"][part], north[part], east[part], up[part])
 
 
-def _poses(signals: Sequence[Signal]) -> dict[str, Signal | None]:
+def _poses(signals: Sequence[ControlledSignal]) -> dict[str, ControlledSignal | None]:
     """Return heading and position of the first topic of a rosbag that has both, which are in ROS's ENU."""
     for yaw in signals:
         topic, _, name = yaw.name.rpartition(" ")
@@ -133,11 +133,13 @@ def _poses(signals: Sequence[Signal]) -> dict[str, Signal | None]:
     return {}
 
 
-def _called(signals: Sequence[Signal], name: str) -> Signal | None:
-    return next((one for one in signals if one.name == name or one.name.endswith(f" {name}")), None)
+def _called(signals: Sequence[ControlledSignal], name: str) -> ControlledSignal | None:
+    return next(
+        (signal for signal in signals if signal.name == name or signal.name.endswith(f" {name}")), None
+    )
 
 
-def _whole(signal: Signal) -> Array:
+def _whole(signal: ControlledSignal) -> Array:
     if signal.period is None:
         return signal.measured
     return np.asarray(np.unwrap(signal.measured, period=signal.period))
@@ -157,12 +159,12 @@ class LiveReference:
         self._begun = False
         self._headings: deque[tuple[float, float]] = deque()
 
-    def __call__(self, elapsed: float) -> Reference | None:
+    def __call__(self, elapsed: float) -> TwinReference | None:
         """Return the last telemetry; NaN while it is silent or stands."""
         seen = self._leader.telemetry
         self._begun = self._begun or (seen.flying and seen.above_home > AIRBORNE)
         if not self._begun:
-            return Reference(*[nan] * 8)
+            return TwinReference(*[nan] * 8)
         if self._over():
             return None
         north = east = nan
@@ -174,7 +176,7 @@ class LiveReference:
             east, north, _ = self._frame.to_enu(place.latitude, place.longitude, place.altitude.metres)
         heading = nan if seen.stale else seen.attitude.heading
         turn_rate = self._turn_rate(elapsed, heading)
-        return Reference(heading, north, east, seen.above_home, *seen.velocity, turn_rate)
+        return TwinReference(heading, north, east, seen.above_home, *seen.velocity, turn_rate)
 
     def _turn_rate(self, elapsed: float, heading: float) -> float:
         """Return the rate of the heading over ``SLOPE_S``, degrees/s; 0 where it is unknown."""
@@ -188,7 +190,7 @@ class LiveReference:
         return float(wrap(heading - old)) / (elapsed - before) if elapsed - before > SLOPE_S / 2.0 else 0.0
 
 
-class Twin(Manoeuvre):
+class Twin(LawManoeuvre):
     """Follows a reference.
 
     Args:
@@ -213,13 +215,13 @@ class Twin(Manoeuvre):
         """Whether the reference has ended."""
         return self._ended
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Follow the reference by its velocity and by its error."""
         aim = self._reference(self._elapsed)
         self._elapsed += sample_s
         if aim is None:
             self._ended = True
-            return Command(), []
+            return MotionCommand(), []
         goals = (aim.north, aim.east, max(self._lowest, aim.up))
         have = (measured.north, measured.east, measured.up)
         ahead = (aim.velocity_north, aim.velocity_east, aim.velocity_up if aim.up > self._lowest else 0.0)
@@ -236,7 +238,7 @@ class Twin(Manoeuvre):
         )
         rate = float(turn.output) if isfinite(aim.heading) else 0.0
         north, east, up = outputs
-        return Command(north, east, up, rate), samples
+        return MotionCommand(north, east, up, rate), samples
 
 
 class TrackingError(NamedTuple):
@@ -253,7 +255,7 @@ SETTLING_S = 5.0
 """Time after the first sample with a reference that is not judged: the twin joins it."""
 
 
-def tracking_errors(signals: Sequence[Signal]) -> list[TrackingError]:
+def tracking_errors(signals: Sequence[ControlledSignal]) -> list[TrackingError]:
     """Return the errors of a twin's loops after it has joined its reference.
 
     Args:
@@ -276,7 +278,7 @@ def tracking_errors(signals: Sequence[Signal]) -> list[TrackingError]:
     return found
 
 
-def describe_judged(signals: Sequence[Signal]) -> str:
+def describe_judged(signals: Sequence[ControlledSignal]) -> str:
     """Return in words which part of a twin's flight ``tracking_errors`` judges, and how far away it began.
 
     Args:
@@ -284,7 +286,7 @@ def describe_judged(signals: Sequence[Signal]) -> str:
     """
     errors = []
     for name in ("north", "east"):
-        signal = _called([one for one in signals if one.controller == "twin"], name)
+        signal = _called([signal for signal in signals if signal.controller == "twin"], name)
         if signal is None or signal.goal is None or not isfinite(_joined(signal)):
             return "the twin never had a reference"
         first = int(np.searchsorted(signal.times, _joined(signal)))
@@ -296,7 +298,7 @@ def describe_judged(signals: Sequence[Signal]) -> str:
     )
 
 
-def _joined(signal: Signal) -> float:
+def _joined(signal: ControlledSignal) -> float:
     """Return the time of the first sample with a set-point; infinite without one."""
     if signal.goal is None:
         return inf

@@ -19,11 +19,18 @@ from math import inf, isfinite, isnan, nan
 from volery.base.errors import CapabilityError, NotArrived, OffTrack, Overridden, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, Ns, S, from_seconds, to_seconds
-from volery.control.actuation import Actuation, Command, Measured
+from volery.control.actuation import Actuation, MeasuredState, MotionCommand
 from volery.control.law_watch import ErrorWatch, FollowWatch, ended_off
 from volery.control.laws import PidGains, PidLaw
-from volery.control.manoeuvres import Landing, LoopSample, Manoeuvre
-from volery.control.safety_switch import Authority, Emergency, Received, SwitchSettings, SwitchState, decide
+from volery.control.manoeuvres import LawManoeuvre, LoopSample, SteppedDescent
+from volery.control.safety_switch import (
+    Authority,
+    Emergency,
+    KnownInputs,
+    SafetyState,
+    SwitchSettings,
+    decide,
+)
 from volery.control.vehicle_answer import LEAST_SHARE, suited
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Rate, sleep
@@ -56,7 +63,7 @@ MARGIN = 1.5
 """Height in m that is left when the last command ends: the drone still has to stop."""
 
 
-def limited_descent(command: Command, height: float) -> Command:
+def limited_descent(command: MotionCommand, height: float) -> MotionCommand:
     """Return the command with a descent that may last ``LASTS_S`` longer without a hard touch-down.
 
     Args:
@@ -85,7 +92,7 @@ class ControlledFlight:
     def __init__(
         self,
         drone: Drone,
-        manoeuvre: Manoeuvre,
+        manoeuvre: LawManoeuvre,
         actuation: Actuation,
         *,
         switch: SwitchSettings | None = None,
@@ -98,14 +105,14 @@ class ControlledFlight:
         self._switch, self._period, self._height = switch, period, height
         self._on_sample = on_sample
         self._as_stated = as_stated
-        self._landing = Landing()
+        self._landing = SteppedDescent()
         self._usual: dict[PidLaw, PidGains] = {}
         self._suited: dict[PidLaw, PidGains] = {}
         self._shares: dict[str, float] = {}
         self._errors, self._follows = ErrorWatch(manoeuvre.laws), FollowWatch()
         self._last: dict[str, LoopSample] = {}
         self._still_s = 0.0
-        self._state = SwitchState()
+        self._state = SafetyState()
         self._looked_at: Ns = -1
         self._frame: LocalFrame | None = None
         self._engaged = False
@@ -148,7 +155,7 @@ class ControlledFlight:
         kernel, seen = self._drone.kernel, self._drone.telemetry
         until = kernel.now() + REPORTS_WITHIN
         reports = (seen.position_reports, seen.heading_reports)
-        while any(isnan(one.seconds) for one in reports) and kernel.now() < until:
+        while any(isnan(report.seconds) for report in reports) and kernel.now() < until:
             sleep(kernel, POLL_PERIOD)
             self._drone.telemetry  # noqa: B018  # a node's loop is run by reading it
 
@@ -191,7 +198,7 @@ class ControlledFlight:
     def _await_switch(self) -> None:
         """Wait until the operator gives control."""
         if self._switch is None:
-            self._state = SwitchState(Authority.AUTONOMOUS, 0, "there is no switch")
+            self._state = SafetyState(Authority.AUTONOMOUS, 0, "there is no switch")
             return
         kernel = self._drone.kernel
         until = kernel.now() + from_seconds(SWITCH_WITHIN_S)
@@ -214,14 +221,14 @@ class ControlledFlight:
         low, high = self._switch.middle
         return f"channel {channel} is at {received.pulse} us; move it to {low} to {high} us, or {without}"
 
-    def _received(self) -> Received:
+    def _received(self) -> KnownInputs:
         assert self._switch is not None
         telemetry, now = self._drone.telemetry, self._drone.kernel.now()
         channels = telemetry.rc
         index = self._switch.channel - 1
         pulse = channels[index] if index < len(channels) else 0
         age = to_seconds(now - telemetry.rc_ns) if telemetry.rc_ns >= 0 else inf
-        return Received(pulse, age, telemetry.silence(now), telemetry.rc_ns != self._looked_at)
+        return KnownInputs(pulse, age, telemetry.silence(now), telemetry.rc_ns != self._looked_at)
 
     def _look(self) -> Authority:
         """Look at the switch and return who has control; a change is recorded."""
@@ -303,7 +310,7 @@ class ControlledFlight:
 
     # -- the loop
 
-    def _fly(self, manoeuvre: Manoeuvre) -> bool:
+    def _fly(self, manoeuvre: LawManoeuvre) -> bool:
         """Fly *manoeuvre*; return whether it ended, and not the flight."""
         kernel = self._drone.kernel
         rate = Rate(kernel, self._period)
@@ -366,7 +373,7 @@ class ControlledFlight:
                 self._release()
         rate.sleep()
 
-    def _take_control(self, manoeuvre: Manoeuvre) -> bool:
+    def _take_control(self, manoeuvre: LawManoeuvre) -> bool:
         if not self._engaged:
             self._blocking(self._actuation.engage)
             if self.authority is Authority.MANUAL:
@@ -377,21 +384,21 @@ class ControlledFlight:
             self._engaged = True
         return True
 
-    def _sample(self, manoeuvre: Manoeuvre, sample_s: float) -> str:
+    def _sample(self, manoeuvre: LawManoeuvre, sample_s: float) -> str:
         """Fly one sample; return what is wrong with the law or the vehicle, in words."""
         measured = self._measure()
         command, samples = manoeuvre.step(measured, sample_s)
         command = limited_descent(command, measured.up)
         self._actuation.apply(command, measured, sample_s)
-        for one in samples:
-            self._record(one)
-            self._last[one.loop] = one
+        for sample in samples:
+            self._record(sample)
+            self._last[sample.loop] = sample
         wrong = self._errors.check(samples, sample_s)
         if not wrong and self._actuation.answer is not None:
             wrong = self._follows.check(command, measured, sample_s)
         return wrong
 
-    def _measure(self) -> Measured:
+    def _measure(self) -> MeasuredState:
         """Return what telemetry reports; an old position is unknown."""
         seen = self._drone.telemetry
         north = east = nan
@@ -402,7 +409,7 @@ class ControlledFlight:
             here = seen.position
             east, north, _ = self._frame.to_enu(here.latitude, here.longitude, here.altitude.metres)
         heading = seen.attitude.heading if not seen.stale else nan
-        return Measured(heading, north, east, seen.above_home, *seen.velocity, self._actuation.lead)
+        return MeasuredState(heading, north, east, seen.above_home, *seen.velocity, self._actuation.lead)
 
     def _record(self, one: LoopSample) -> None:
         kernel, terms = self._drone.kernel, one.terms

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from math import copysign, hypot, isfinite, nan
 from typing import NamedTuple
 
-from volery.control.actuation import Command, Measured
+from volery.control.actuation import MeasuredState, MotionCommand
 from volery.control.laws import Law, PidLaw, wrap
 from volery.control.manoeuvres import LoopSample
 
@@ -57,20 +57,20 @@ class ErrorWatch:
             samples: the loops of one sample.
             sample_s: time since the last sample, s.
         """
-        for one in samples:
-            error = abs(float(one.terms.error))
-            if one.unit not in {"m", "deg"} or not isfinite(error):
+        for sample in samples:
+            error = abs(float(sample.terms.error))
+            if sample.unit not in {"m", "deg"} or not isfinite(error):
                 continue
-            goal, least = self._least.get(one.loop, (one.goal, error))
-            least = min(least, error) if goal == one.goal else error
-            self._least[one.loop] = one.goal, least
-            most = least + (GROWTH_M if one.unit == "m" else GROWTH_DEG)
-            grown_s = self._grown_s.get(one.loop, 0.0) + sample_s if error > most else 0.0
-            self._grown_s[one.loop] = grown_s
+            goal, least = self._least.get(sample.loop, (sample.goal, error))
+            least = min(least, error) if goal == sample.goal else error
+            self._least[sample.loop] = sample.goal, least
+            most = least + (GROWTH_M if sample.unit == "m" else GROWTH_DEG)
+            grown_s = self._grown_s.get(sample.loop, 0.0) + sample_s if error > most else 0.0
+            self._grown_s[sample.loop] = grown_s
             if grown_s >= GROWN_FOR_S:
                 return (
-                    f"the error of {one.loop} grew from {least:.1f} to {error:.1f} {one.unit}, beyond the "
-                    f"limit of {most:.1f} {one.unit}, under {self._law(one.loop)}"
+                    f"the error of {sample.loop} grew from {least:.1f} to {error:.1f} {sample.unit}, beyond "
+                    f"the limit of {most:.1f} {sample.unit}, under {self._law(sample.loop)}"
                 )
         return ""
 
@@ -108,11 +108,11 @@ class FollowWatch:
         self._now_s = 0.0
         self._asked, self._came, self._felt = [0.0] * 4, [0.0] * 4, [0.0] * 4
         self._steady_s = [0.0] * 4
-        self._command = Command()
-        self._last: Measured | None = None
+        self._command = MotionCommand()
+        self._last: MeasuredState | None = None
         self._seen: deque[_Sums] = deque()
 
-    def check(self, command: Command, measured: Measured, sample_s: float) -> str:
+    def check(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> str:
         """Return what was asked and what came, if the vehicle does not follow; else an empty text.
 
         Args:
@@ -136,7 +136,7 @@ class FollowWatch:
             self._seen.popleft()
         return next(filter(None, map(self._judged, range(4))), "")
 
-    def _motion(self, now: Measured) -> tuple[float, float, float, float]:
+    def _motion(self, now: MeasuredState) -> tuple[float, float, float, float]:
         last = self._last or now
         turned = float(wrap(now.heading - last.heading)) if isfinite(now.heading - last.heading) else nan
         return now.north - last.north, now.east - last.east, now.up - last.up, turned
@@ -171,7 +171,7 @@ def ended_off(samples: Iterable[LoopSample], accuracy_m: float) -> str:
         samples: the last sample of each loop.
         accuracy_m: distance within which it ends where it should, m.
     """
-    errors = {one.loop: (float(one.terms.error), one.unit) for one in samples}
+    errors = {sample.loop: (float(sample.terms.error), sample.unit) for sample in samples}
     distance = hypot(*(error for error, unit in errors.values() if unit == "m"))
     turn = max((abs(error) for error, unit in errors.values() if unit == "deg"), default=0.0)
     if not distance <= accuracy_m:

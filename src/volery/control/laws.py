@@ -50,16 +50,16 @@ def _check(gains: object, *, above_zero: tuple[str, ...] = ()) -> None:
     Raises:
         UsageError: a gain is.
     """
-    for one in fields(gains):  # type: ignore[arg-type]  # every caller is a dataclass
-        value = getattr(gains, one.name)
-        if value is None or isinstance(value, bool | str) or one.name == "low":
+    for field in fields(gains):  # type: ignore[arg-type]  # every caller is a dataclass
+        value = getattr(gains, field.name)
+        if value is None or isinstance(value, bool | str) or field.name == "low":
             continue
         numbers = np.asarray(value, dtype=float)
         if np.isnan(numbers).any():
-            raise UsageError(f"{one.name} is not a number; give one, 0 or above")
-        if (numbers < 0.0).any() or (one.name in above_zero and (numbers == 0.0).any()):
-            limit = "above 0" if one.name in above_zero else "0 or above"
-            raise UsageError(f"{one.name}={value} is negative or zero; give one {limit}")
+            raise UsageError(f"{field.name} is not a number; give one, 0 or above")
+        if (numbers < 0.0).any() or (field.name in above_zero and (numbers == 0.0).any()):
+            limit = "above 0" if field.name in above_zero else "0 or above"
+            raise UsageError(f"{field.name}={value} is negative or zero; give one {limit}")
 
 
 # -- PID

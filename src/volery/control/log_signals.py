@@ -20,7 +20,7 @@ from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.base.time import to_seconds
 from volery.control.laws import DEGREES
-from volery.control.step_response import Array, Idle, Signal, make_signal
+from volery.control.step_response import Array, ControlledSignal, GroundedStretch, make_signal
 from volery.links.flight_logs import (
     DATAFLASH,
     STATION,
@@ -38,7 +38,7 @@ from volery.links.flight_logs import (
 from volery.links.mavlink_messages import constant
 from volery.trace.events import ControlSample, VehicleState
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 Values = Callable[[Table], Array]
 TURN = {"deg": DEGREES, "rad": 2.0 * np.pi}
@@ -46,7 +46,7 @@ LISTED = 40
 """Columns that an error lists."""
 
 
-class Source(NamedTuple):
+class SignalSource(NamedTuple):
     """Where a value stands: a table and how its columns give the value."""
 
     table: str
@@ -54,27 +54,27 @@ class Source(NamedTuple):
     needs: tuple[str, ...]
 
 
-class Quantity(NamedTuple):
+class LoggedQuantity(NamedTuple):
     """A controlled quantity of a format: its measurement, and set-points of which the first found counts."""
 
     name: str
     unit: str
-    measured: Source
-    goals: tuple[Source, ...] = ()
+    measured: SignalSource
+    goals: tuple[SignalSource, ...] = ()
     angle: bool = False
 
 
-def _column(table: str, column: str, factor: float = 1.0) -> Source:
-    return Source(table, lambda rows: rows[column] * factor, (column,))
+def _column(table: str, column: str, factor: float = 1.0) -> SignalSource:
+    return SignalSource(table, lambda rows: rows[column] * factor, (column,))
 
 
-def _euler(table: str, axis: int, *columns: str) -> Source:
+def _euler(table: str, axis: int, *columns: str) -> SignalSource:
     """Return roll, pitch or yaw (*axis* 0 to 2) in degrees of a quaternion given as w, x, y, z."""
 
     def value(rows: Table) -> Array:
-        return euler_degrees(*(rows[one] for one in columns))[axis]
+        return euler_degrees(*(rows[column] for column in columns))[axis]
 
-    return Source(table, value, columns)
+    return SignalSource(table, value, columns)
 
 
 def euler_degrees(w: Array, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
@@ -87,7 +87,7 @@ def euler_degrees(w: Array, x: Array, y: Array, z: Array) -> tuple[Array, Array,
     return np.degrees(roll), np.degrees(np.arcsin(sine)), np.degrees(yaw)
 
 
-def _quaternion(table: str, axis: int, field: str) -> Source:
+def _quaternion(table: str, axis: int, field: str) -> SignalSource:
     return _euler(table, axis, *(f"{field}[{index}]" for index in range(4)))
 
 
@@ -96,24 +96,26 @@ ALTITUDE = "altitude"
 
 _OF_DATAFLASH = (
     *(
-        Quantity(
+        LoggedQuantity(
             name, "deg", _column("ATT", name.capitalize()), (_column("ATT", f"Des{name.capitalize()}"),), True
         )
         for name in AXES
     ),
     *(
-        Quantity(f"{name} rate", "deg/s", _column("RATE", letter), (_column("RATE", f"{letter}Des"),))
+        LoggedQuantity(f"{name} rate", "deg/s", _column("RATE", letter), (_column("RATE", f"{letter}Des"),))
         for name, letter in zip(AXES, "RPY", strict=True)
     ),
-    Quantity(ALTITUDE, "m", _column("CTUN", "Alt"), (_column("CTUN", "DAlt"),)),
+    LoggedQuantity(ALTITUDE, "m", _column("CTUN", "Alt"), (_column("CTUN", "DAlt"),)),
     *(
-        Quantity(name, "m", _column(f"PSC{letter}", f"P{letter}"), (_column(f"PSC{letter}", f"TP{letter}"),))
+        LoggedQuantity(
+            name, "m", _column(f"PSC{letter}", f"P{letter}"), (_column(f"PSC{letter}", f"TP{letter}"),)
+        )
         for name, letter in (("north", "N"), ("east", "E"))
     ),
 )
 _OF_ULOG = (
     *(
-        Quantity(
+        LoggedQuantity(
             name,
             "deg",
             _quaternion("vehicle_attitude", axis, "q"),
@@ -123,7 +125,7 @@ _OF_ULOG = (
         for axis, name in enumerate(AXES)
     ),
     *(
-        Quantity(
+        LoggedQuantity(
             f"{name} rate",
             "deg/s",
             _column("vehicle_angular_velocity", f"xyz[{axis}]", np.degrees(1.0)),
@@ -132,7 +134,7 @@ _OF_ULOG = (
         for axis, name in enumerate(AXES)
     ),
     *(
-        Quantity(
+        LoggedQuantity(
             name,
             "m",
             _column("vehicle_local_position", axis, sign),
@@ -143,7 +145,7 @@ _OF_ULOG = (
 )
 _OF_TLOG = (
     *(
-        Quantity(
+        LoggedQuantity(
             name,
             "deg",
             _column("ATTITUDE", name, np.degrees(1.0)),
@@ -153,7 +155,7 @@ _OF_TLOG = (
         for axis, (name, nav) in enumerate(zip(AXES, ("nav_roll", "nav_pitch", "nav_bearing"), strict=True))
     ),
     *(
-        Quantity(
+        LoggedQuantity(
             name,
             "m",
             _column("LOCAL_POSITION_NED", axis, sign),
@@ -165,10 +167,14 @@ _OF_TLOG = (
         for name, axis, sign in (("north", "x", 1.0), ("east", "y", 1.0), (ALTITUDE, "z", -1.0))
     ),
 )
-QUANTITIES: Mapping[str, tuple[Quantity, ...]] = {DATAFLASH: _OF_DATAFLASH, ULOG: _OF_ULOG, TLOG: _OF_TLOG}
+QUANTITIES: Mapping[str, tuple[LoggedQuantity, ...]] = {
+    DATAFLASH: _OF_DATAFLASH,
+    ULOG: _OF_ULOG,
+    TLOG: _OF_TLOG,
+}
 
 
-def read_signals(path: Path) -> list[Signal]:
+def read_signals(path: Path) -> list[ControlledSignal]:
     """Return the controlled quantities that a record has.
 
     Args:
@@ -183,7 +189,7 @@ def read_signals(path: Path) -> list[Signal]:
         return _signals_of_bag(path, _bag_tables(path))
     kind = log_format(path)
     quantities = QUANTITIES[kind]
-    wanted = {source.table for one in quantities for source in (one.measured, *one.goals)}
+    wanted = {source.table for quantity in quantities for source in (quantity.measured, *quantity.goals)}
     tables = read_flight_log(path, wanted, STATES[kind])
     found = []
     for vehicle in vehicles_in(tables):
@@ -195,7 +201,7 @@ def read_signals(path: Path) -> list[Signal]:
                 idle_here = _with_take_off(idle) if one.name == ALTITUDE else idle
                 found.append(replace(signal, engaged=False, idle=idle_here, sent=sent))
     if not found:
-        have = ", ".join(sorted({one.measured.table for one in quantities}))
+        have = ", ".join(sorted({quantity.measured.table for quantity in quantities}))
         raise UsageError(f"{path} ({kind}) has neither attitude nor position: none of {have}")
     return found
 
@@ -229,20 +235,20 @@ TAKE_OFF_S = 3.0
 """Time before a take-off, s, in which an altitude may be commanded on the ground."""
 
 
-def _held(times: Array, idle: NDArray[np.bool_], why: str) -> list[Idle]:
+def _held(times: Array, idle: NDArray[np.bool_], why: str) -> list[GroundedStretch]:
     """Return the stretches in which a state that holds until its next record is *idle*."""
     ends = np.append(times[1:], np.inf)
-    found: list[Idle] = []
+    found: list[GroundedStretch] = []
     for start, end, off in zip(times, ends, idle, strict=True):
         if off and found and found[-1].end == start:
             found[-1] = found[-1]._replace(end=float(end))
         elif off:
-            found.append(Idle(float(start), float(end), why))
+            found.append(GroundedStretch(float(start), float(end), why))
     return found
 
 
-def _idle_of_tlog(tables: Tables, vehicle: str) -> list[Idle]:
-    found: list[Idle] = []
+def _idle_of_tlog(tables: Tables, vehicle: str) -> list[GroundedStretch]:
+    found: list[GroundedStretch] = []
     beats, state = tables.get(f"{vehicle}HEARTBEAT"), tables.get(f"{vehicle}EXTENDED_SYS_STATE")
     if beats is not None and len(beats[TIME]) > 1:  # one heartbeat states nothing of a flight
         armed = beats["base_mode"].astype(int) & _ARMED_FLAG
@@ -257,8 +263,8 @@ def _from_the_start(times: Array) -> Array:
     return np.concatenate(([-np.inf], times[1:]))
 
 
-def _idle_of_ulog(tables: Tables, vehicle: str) -> list[Idle]:
-    found: list[Idle] = []
+def _idle_of_ulog(tables: Tables, vehicle: str) -> list[GroundedStretch]:
+    found: list[GroundedStretch] = []
     status, land = tables.get("vehicle_status"), tables.get("vehicle_land_detected")
     if status is not None and "arming_state" in status:
         found += _held(_from_the_start(status[TIME]), status["arming_state"] != _ULOG_ARMED, DISARMED)
@@ -267,9 +273,9 @@ def _idle_of_ulog(tables: Tables, vehicle: str) -> list[Idle]:
     return found
 
 
-def _idle_of_dataflash(tables: Tables, vehicle: str) -> list[Idle]:
+def _idle_of_dataflash(tables: Tables, vehicle: str) -> list[GroundedStretch]:
     """Return the stretches of a log that has events; before the first event the opposite held."""
-    found: list[Idle] = []
+    found: list[GroundedStretch] = []
     events = tables.get("EV")
     if events is None or "Id" not in events:
         return found
@@ -281,14 +287,14 @@ def _idle_of_dataflash(tables: Tables, vehicle: str) -> list[Idle]:
     return found
 
 
-_IDLE: Mapping[str, Callable[[Tables, str], list[Idle]]] = {
+_IDLE: Mapping[str, Callable[[Tables, str], list[GroundedStretch]]] = {
     TLOG: _idle_of_tlog,
     ULOG: _idle_of_ulog,
     DATAFLASH: _idle_of_dataflash,
 }
 
 
-def _with_take_off(idle: Sequence[Idle]) -> list[Idle]:
+def _with_take_off(idle: Sequence[GroundedStretch]) -> list[GroundedStretch]:
     """Return the stretches without the moments before a take-off, in which its altitude is commanded."""
     return [
         one if one.why != LANDED else one._replace(end=max(one.start, one.end - TAKE_OFF_S)) for one in idle
@@ -300,7 +306,7 @@ _TURN, _TAKE_OFF, _REPOSITION = (
 )
 
 
-def _sent(tables: Tables, quantity: Quantity, vehicle: str) -> list[float]:
+def _sent(tables: Tables, quantity: LoggedQuantity, vehicle: str) -> list[float]:
     """Return the times at which a ground station commanded a quantity: one that is repeated counts once."""
     system = int(vehicle[len(VEHICLE) : -1] or 0)
     wanted = (_TURN,) if quantity.name == "yaw" else (_TAKE_OFF, _REPOSITION)
@@ -313,13 +319,13 @@ def _sent(tables: Tables, quantity: Quantity, vehicle: str) -> list[float]:
         if "command" in rows:
             fresh = np.isin(rows["command"], wanted)
         else:
-            values = [rows[one] for one in rows if one not in (TIME, "time_boot_ms")]
+            values = [rows[row] for row in rows if row not in (TIME, "time_boot_ms")]
             fresh = np.append(True, np.any(np.diff(np.array(values), axis=1) != 0.0, axis=0))
         times += rows[TIME][to_it & fresh].tolist()
     return sorted(times)
 
 
-def chosen_signal(path: Path, measured: str, goal: str | None = None, unit: str = "") -> Signal:
+def chosen_signal(path: Path, measured: str, goal: str | None = None, unit: str = "") -> ControlledSignal:
     """Return the signal of two columns of a record.
 
     Args:
@@ -353,17 +359,17 @@ def _records_of(tables: Tables, name: str, path: Path) -> tuple[Array, Array]:
     raise UsageError(f"{path} has no column {name!r}; it has {', '.join(known[:LISTED])}{more}")
 
 
-def _signal(tables: Tables, one: Quantity, vehicle: str) -> Signal | None:
+def _signal(tables: Tables, one: LoggedQuantity, vehicle: str) -> ControlledSignal | None:
     measured = _values(tables, one.measured, vehicle)
     if measured is None:
         return None
     goals = (_values(tables, source, vehicle) for source in one.goals)
-    goal = next((found for found in goals if found is not None), None)
+    goal = next((goal for goal in goals if goal is not None), None)
     name = f"{vehicle.rstrip('.')} {one.name}".lstrip()
     return make_signal(name, one.unit, measured, goal, period=DEGREES if one.angle else None)
 
 
-def _values(tables: Tables, source: Source, vehicle: str) -> tuple[Array, Array] | None:
+def _values(tables: Tables, source: SignalSource, vehicle: str) -> tuple[Array, Array] | None:
     table = tables.get(f"{vehicle}{source.table}" if not source.table.startswith(STATION) else source.table)
     if table is None or any(name not in table for name in source.needs):
         return None
@@ -377,12 +383,12 @@ def _is_run(path: Path) -> bool:
     return (path / TRACE_FILE).is_file() if path.is_dir() else path.name == TRACE_FILE
 
 
-def _signals_of_run(path: Path) -> list[Signal]:
+def _signals_of_run(path: Path) -> list[ControlledSignal]:
     """Return the loops that were recorded; without any, heading and position of each vehicle."""
     loops: dict[tuple[str, str, str, str, float], list[tuple[float, float, float]]] = {}
     states: dict[str, list[tuple[float, ...]]] = {}
     armed: dict[str, list[tuple[float, float]]] = {}
-    with Reading(path / TRACE_FILE if path.is_dir() else path) as reading:
+    with OpenTrace(path / TRACE_FILE if path.is_dir() else path) as reading:
         for event in reading.events({ControlSample, VehicleState}):
             if isinstance(event, ControlSample):
                 key = event.vehicle, event.loop, event.unit, event.controller, event.period
@@ -459,7 +465,7 @@ SET_POINT_WORDS = ("setpoint", "goal", "target", "cmd")
 _POSES = ("pose.pose.", "pose.", "transform.", "")
 
 
-def _signals_of_bag(path: Path, tables: Tables) -> list[Signal]:
+def _signals_of_bag(path: Path, tables: Tables) -> list[ControlledSignal]:
     """Return yaw and position of each topic with a pose; a topic named as a set-point is the others' goal."""
     goals = {topic: rows for topic, rows in tables.items() if any(word in topic for word in SET_POINT_WORDS)}
     found = []
@@ -482,13 +488,15 @@ def _signals_of_bag(path: Path, tables: Tables) -> list[Signal]:
     return found
 
 
-def _idle_of_bag(tables: Tables, topic: str) -> list[Idle]:
+def _idle_of_bag(tables: Tables, topic: str) -> list[GroundedStretch]:
     """Return the stretches of the vehicle whose namespace a topic is in, by MAVROS's names of its state."""
-    found: list[Idle] = []
+    found: list[GroundedStretch] = []
     for column, ending in (("armed", "/state"), ("landed_state", "/extended_state")):
-        states = [one for one in tables if one.endswith(ending) and column in tables[one]]
+        states = [table for table in tables if table.endswith(ending) and column in tables[table]]
         mine = [
-            one for one in states if topic.startswith(one.removesuffix("state").removesuffix("extended_"))
+            state
+            for state in states
+            if topic.startswith(state.removesuffix("state").removesuffix("extended_"))
         ]
         for one in mine[:1] or (states if len(states) == 1 else []):
             rows = tables[one]

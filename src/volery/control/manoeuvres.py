@@ -12,7 +12,7 @@ from math import hypot, inf, isfinite
 from typing import NamedTuple
 
 from volery.base.errors import UsageError
-from volery.control.actuation import Command, Measured
+from volery.control.actuation import MeasuredState, MotionCommand
 from volery.control.laws import DEGREES, Law, OnOffGains, OnOffLaw, PidGains, PidLaw, Terms, per_sample
 
 YAW_GAINS = PidGains(
@@ -49,7 +49,7 @@ class LoopSample(NamedTuple):
     terms: Terms
 
 
-class Manoeuvre(ABC):
+class LawManoeuvre(ABC):
     """A sequence of set-points under laws.
 
     Attributes:
@@ -72,7 +72,7 @@ class Manoeuvre(ABC):
         return ""
 
     @abstractmethod
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Return the command of one sample and the terms of its loops.
 
         Args:
@@ -87,7 +87,7 @@ class Manoeuvre(ABC):
                 law.reset()
 
 
-def set_gains(manoeuvre: Manoeuvre, loop: str, gains: PidGains) -> None:
+def set_gains(manoeuvre: LawManoeuvre, loop: str, gains: PidGains) -> None:
     """Change the gains of a loop without a bump, also in flight.
 
     Raises:
@@ -111,25 +111,25 @@ class _Hold:
         self.laws = laws
         self.at: Mapping[str, float] | None = None
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, list[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, list[LoopSample]]:
         here = {"north": measured.north, "east": measured.east, "altitude": measured.up}
         if self.at is None and all(map(isfinite, here.values())):
             self.at = here
         if self.at is None:
-            return Command(), []
+            return MotionCommand(), []
         outputs, samples = dict.fromkeys(here, 0.0), []
         for loop, law in self.laws.items():
             terms = law(self.at[loop], here[loop], sample_s)
             outputs[loop] = float(terms.output)
             samples.append(LoopSample(loop, "PID", "m", 0.0, self.at[loop], here[loop], terms))
-        return Command(outputs["north"], outputs["east"], outputs["altitude"]), samples
+        return MotionCommand(outputs["north"], outputs["east"], outputs["altitude"]), samples
 
 
 def _plane_laws() -> dict[str, PidLaw]:
     return {"north": PidLaw(POSITION_GAINS), "east": PidLaw(POSITION_GAINS)}
 
 
-class Rotation(Manoeuvre):
+class Rotation(LawManoeuvre):
     """Turns to one heading after the other, and holds each for the same time.
 
     Args:
@@ -166,7 +166,7 @@ class Rotation(Manoeuvre):
         """Whether every heading has had its time."""
         return self._elapsed >= self._hold_s * len(self._headings)
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Turn to the present heading."""
         index = min(int(self._elapsed / self._hold_s), len(self._headings) - 1)
         self._elapsed += sample_s
@@ -177,7 +177,7 @@ class Rotation(Manoeuvre):
         return place._replace(yaw_rate=float(terms.output)), [sample, *held]
 
 
-class Altitude(Manoeuvre):
+class Altitude(LawManoeuvre):
     """Climbs or descends to one height after the other, and holds each for the same time.
 
     Args:
@@ -190,7 +190,7 @@ class Altitude(Manoeuvre):
     def __init__(
         self, heights: Sequence[float], hold_s: float = 15.0, law: Law | None = None, controller: str = "PID"
     ) -> None:
-        if not heights or not all(isfinite(one) and one > 0.0 for one in heights):
+        if not heights or not all(isfinite(height) and height > 0.0 for height in heights):
             raise UsageError(f"altitude {list(heights)}: give at least one height above home, above 0 m")
         if not hold_s > 0.0:
             raise UsageError(f"altitude: each height for {hold_s:g} s; give a time above 0")
@@ -207,7 +207,7 @@ class Altitude(Manoeuvre):
         """Whether every height has had its time."""
         return self._elapsed >= self._hold_s * len(self._heights)
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Climb or descend to the present height."""
         index = min(int(self._elapsed / self._hold_s), len(self._heights) - 1)
         self._elapsed += sample_s
@@ -225,7 +225,7 @@ class Corner(NamedTuple):
     error: float
 
 
-class Waypoints(Manoeuvre):
+class Waypoints(LawManoeuvre):
     """Flies to way points one after the other and holds each.
 
     Args:
@@ -286,7 +286,7 @@ class Waypoints(Manoeuvre):
             f"{self._nearest:.2f} m; a larger tolerance may do"
         )
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Fly towards the present point."""
         here = measured.north, measured.east, measured.up
         if self._heading is None and isfinite(measured.heading):
@@ -300,7 +300,7 @@ class Waypoints(Manoeuvre):
             samples.append(LoopSample(loop, "PID", "m", 0.0, goal, value, terms))
         turn = self._yaw(self._heading or 0.0, measured.heading + measured.lead, sample_s)
         north, east, up = outputs
-        return Command(north, east, up, float(turn.output)), samples
+        return MotionCommand(north, east, up, float(turn.output)), samples
 
     def _advance(self, here: tuple[float, float, float], sample_s: float) -> None:
         """Go on to the next point once the present one was held."""
@@ -343,7 +343,7 @@ def cube(
     return [(*at, height) for at in square] + [(*at, height + side) for at in square]
 
 
-class Landing(Manoeuvre):
+class SteppedDescent(LawManoeuvre):
     """Descends in place through intermediate heights, slower from each to the next, and keeps the heading.
 
     The last part is flown at ``touch_down``, so that a wrong height does no harm. It never ends by itself:
@@ -387,7 +387,7 @@ class Landing(Manoeuvre):
             height = min(height, above)
         return seconds + max(0.0, height) / self._touch_down
 
-    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+    def step(self, measured: MeasuredState, sample_s: float) -> tuple[MotionCommand, Sequence[LoopSample]]:
         """Descend."""
         place, held = self._place.step(measured, sample_s)
         if self._heading is None and isfinite(measured.heading):

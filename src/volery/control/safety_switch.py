@@ -28,7 +28,7 @@ class Authority(Enum):
     LANDING = "emergency landing"
 
 
-class Reaction(Enum):
+class SafetyReaction(Enum):
     """What happens when something is lost in the air."""
 
     LAND = "land"
@@ -45,10 +45,10 @@ class Emergency(Enum):
     """The landing law's descent in steps, as in the thesis, which needs the link to the end."""
 
 
-AFTER: Mapping[Reaction, Authority] = {
-    Reaction.LAND: Authority.LANDING,
-    Reaction.RELEASE: Authority.MANUAL,
-    Reaction.CONTINUE: Authority.AUTONOMOUS,
+AFTER: Mapping[SafetyReaction, Authority] = {
+    SafetyReaction.LAND: Authority.LANDING,
+    SafetyReaction.RELEASE: Authority.MANUAL,
+    SafetyReaction.CONTINUE: Authority.AUTONOMOUS,
 }
 LEAST_PULSE, GREATEST_PULSE = 800, 2200
 """Range of valid pulse widths, µs; autopilots report 0 or 65535 for a channel without a signal."""
@@ -82,8 +82,8 @@ class SwitchSettings:
     landing_above: int = 1700
     missing_s: float = 1.0
     silent_s: float = 2.0
-    on_rc_loss: Reaction = Reaction.LAND
-    on_telemetry_loss: Reaction = Reaction.LAND
+    on_rc_loss: SafetyReaction = SafetyReaction.LAND
+    on_telemetry_loss: SafetyReaction = SafetyReaction.LAND
     emergency: Emergency = Emergency.AUTOPILOT
 
     def __post_init__(self) -> None:
@@ -99,7 +99,7 @@ class SwitchSettings:
         for name in ("missing_s", "silent_s"):
             if isnan(getattr(self, name)) or getattr(self, name) <= 0.0:
                 raise UsageError(f"safety switch: {name}={getattr(self, name)}; give seconds above 0")
-        if self.on_telemetry_loss is Reaction.CONTINUE:
+        if self.on_telemetry_loss is SafetyReaction.CONTINUE:
             raise UsageError("safety switch: no law can continue without telemetry; give land or release")
 
     @property
@@ -108,12 +108,12 @@ class SwitchSettings:
         return self.manual_below + HYSTERESIS, self.landing_above - HYSTERESIS
 
 
-def parse_reaction(text: str) -> Reaction:
+def parse_reaction(text: str) -> SafetyReaction:
     """Return the reaction called *text*; ``UsageError`` names the valid ones."""
-    for one in Reaction:
+    for one in SafetyReaction:
         if one.value == text:
             return one
-    raise UsageError(f"reaction {text!r}; there is {choices([one.value for one in Reaction])}")
+    raise UsageError(f"reaction {text!r}; there is {choices([one.value for one in SafetyReaction])}")
 
 
 def parse_emergency(text: str) -> Emergency:
@@ -124,7 +124,7 @@ def parse_emergency(text: str) -> Emergency:
     raise UsageError(f"emergency landing by {text!r}; there is {choices([one.value for one in Emergency])}")
 
 
-class SwitchState(NamedTuple):
+class SafetyState(NamedTuple):
     """State between two decisions.
 
     Attributes:
@@ -140,7 +140,7 @@ class SwitchState(NamedTuple):
     lost: int = 0
 
 
-class Received(NamedTuple):
+class KnownInputs(NamedTuple):
     """What is known at one moment.
 
     Attributes:
@@ -161,7 +161,7 @@ class Received(NamedTuple):
         return LEAST_PULSE <= self.pulse <= GREATEST_PULSE
 
 
-def decide(settings: SwitchSettings, state: SwitchState, received: Received) -> SwitchState:
+def decide(settings: SwitchSettings, state: SafetyState, received: KnownInputs) -> SafetyState:
     """Return the state after one look at what is received.
 
     Args:
@@ -181,27 +181,29 @@ def decide(settings: SwitchSettings, state: SwitchState, received: Received) -> 
     return _by_position(settings, state._replace(lost=0), received)
 
 
-def _by_position(settings: SwitchSettings, state: SwitchState, received: Received) -> SwitchState:
+def _by_position(settings: SwitchSettings, state: SafetyState, received: KnownInputs) -> SafetyState:
     pulse = received.pulse
     if pulse < settings.manual_below:
-        return SwitchState(Authority.MANUAL, 0, f"the switch is at {pulse} us: manual takeover")
+        return SafetyState(Authority.MANUAL, 0, f"the switch is at {pulse} us: manual takeover")
     if pulse > settings.landing_above:
         confirmed = state.confirmed + (1 if received.new else 0)
         if state.authority is Authority.AUTONOMOUS and confirmed >= CONFIRMED:
             why = f"the switch is at {pulse} us: emergency landing"
-            return SwitchState(Authority.LANDING, confirmed, why)
+            return SafetyState(Authority.LANDING, confirmed, why)
         return state._replace(confirmed=confirmed)
     low, high = settings.middle
     if state.authority is Authority.MANUAL and low <= pulse <= high:
-        return SwitchState(Authority.AUTONOMOUS, 0, f"the switch is at {pulse} us: autonomous")
+        return SafetyState(Authority.AUTONOMOUS, 0, f"the switch is at {pulse} us: autonomous")
     return state._replace(confirmed=0)
 
 
-def _lost(state: SwitchState, received: Received, late_s: float, reaction: Reaction, why: str) -> SwitchState:
+def _lost(
+    state: SafetyState, received: KnownInputs, late_s: float, reaction: SafetyReaction, why: str
+) -> SafetyState:
     """Return the state after a loss: it ends autonomous flight only, and never begins one."""
-    if state.authority is not Authority.AUTONOMOUS or reaction is Reaction.CONTINUE:
+    if state.authority is not Authority.AUTONOMOUS or reaction is SafetyReaction.CONTINUE:
         return state._replace(confirmed=0)
     lost = state.lost + (1 if received.new else 0)
     if lost < CONFIRMED and late_s < CONFIRMED_AFTER_S:
         return state._replace(confirmed=0, lost=lost)
-    return SwitchState(AFTER[reaction], 0, f"{why}: {reaction.value}")
+    return SafetyState(AFTER[reaction], 0, f"{why}: {reaction.value}")

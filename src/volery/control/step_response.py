@@ -45,7 +45,7 @@ HALF_TURN = 170.0 / 360.0
 """Share of a turn from which a step counts as a half turn: either direction is right."""
 
 
-class Idle(NamedTuple):
+class GroundedStretch(NamedTuple):
     """A stretch of a record, s, in which the vehicle does not fly, and why: ``disarmed`` ..."""
 
     start: float
@@ -62,7 +62,7 @@ class NotJudged(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Signal:
+class ControlledSignal:
     """One controlled quantity over time.
 
     Attributes:
@@ -89,9 +89,9 @@ class Signal:
     stated: Array | None = None
     sent: Sequence[float] = ()
     engaged: bool = True
-    idle: Sequence[Idle] = ()
+    idle: Sequence[GroundedStretch] = ()
 
-    def between(self, start: float, end: float) -> Signal:
+    def between(self, start: float, end: float) -> ControlledSignal:
         """Return the part from *start* to *end*, s."""
         inside = (self.times >= start) & (self.times <= end)
         goal = self.goal[inside] if self.goal is not None else None
@@ -106,7 +106,7 @@ def make_signal(
     *,
     period: float | None = None,
     controller: str = "",
-) -> Signal:
+) -> ControlledSignal:
     """Return a signal of two records with times of their own; the set-point holds until it changes.
 
     Args:
@@ -124,7 +124,7 @@ def make_signal(
         at, stated = _in_order(*goal)
         index = np.searchsorted(at, times, side="right") - 1
         aims = np.where(index >= 0, stated[np.maximum(index, 0)], np.nan)
-    return Signal(name, unit, times, values, aims, period, controller, at)
+    return ControlledSignal(name, unit, times, values, aims, period, controller, at)
 
 
 def _in_order(times: Array, values: Array) -> tuple[Array, Array]:
@@ -199,7 +199,7 @@ LEAST_STEP = {"deg": 5.0, "rad": float(np.radians(5.0)), "m": 0.5, "deg/s": 10.0
 """Least size of a step that is worth a row, by unit."""
 
 
-def default_threshold(signal: Signal) -> float:
+def default_threshold(signal: ControlledSignal) -> float:
     """Return the least size of a step: that of its unit, and for other units a tenth of the range."""
     if signal.unit in LEAST_STEP:
         return LEAST_STEP[signal.unit]
@@ -215,12 +215,12 @@ class Judgement(NamedTuple):
     not_judged: list[NotJudged]
 
 
-def step_responses(signal: Signal, least: float | None = None) -> list[StepResponse]:
+def step_responses(signal: ControlledSignal, least: float | None = None) -> list[StepResponse]:
     """Return the response to each step and ramp of *signal*; see ``judged``."""
     return judged(signal, least).responses
 
 
-def judged(signal: Signal, least: float | None = None) -> Judgement:
+def judged(signal: ControlledSignal, least: float | None = None) -> Judgement:
     """Return the responses in *signal*, and the changes of its set-point that are not judged.
 
     Args:
@@ -236,17 +236,17 @@ def judged(signal: Signal, least: float | None = None) -> Judgement:
     if not threshold > 0.0:
         raise UsageError(f"steps of at least {threshold:g} {signal.unit}; give a size above 0")
     changes = _goal_changes(signal, threshold) if signal.goal is not None else _movements(signal, threshold)
-    found = Judgement([], [])
-    for one in changes:
-        outcome = _outcome(signal, one, threshold)
+    judgement = Judgement([], [])
+    for change in changes:
+        outcome = _outcome(signal, change, threshold)
         if isinstance(outcome, StepResponse):
-            found.responses.append(outcome)
+            judgement.responses.append(outcome)
         elif outcome:
-            found.not_judged.append(NotJudged(one.leaves, one.end, outcome))
-    return found
+            judgement.not_judged.append(NotJudged(change.leaves, change.end, outcome))
+    return judgement
 
 
-class _Change(NamedTuple):
+class _SetpointChange(NamedTuple):
     """A change of the set-point: when it leaves its level, reaches the next, leaves that, and the level.
 
     ``problem`` is why it is neither step nor ramp.
@@ -261,7 +261,7 @@ class _Change(NamedTuple):
     problem: str = ""
 
 
-def _outcome(signal: Signal, change: _Change, threshold: float) -> StepResponse | str:
+def _outcome(signal: ControlledSignal, change: _SetpointChange, threshold: float) -> StepResponse | str:
     """Return the response to a change, or why it is not judged; empty if it is not worth a word."""
     end, cut = change.end, ""
     for idle in signal.idle:
@@ -286,14 +286,14 @@ def _outcome(signal: Signal, change: _Change, threshold: float) -> StepResponse 
     return response._replace(ramp=change.ramp, resolution=change.resolution)
 
 
-def _size(signal: Signal, change: _Change) -> float:
+def _size(signal: ControlledSignal, change: _SetpointChange) -> float:
     """Return the size of a change from where the measurement is when it begins."""
     begin = change.leaves if change.ramp else change.start
     origin = float(np.interp(begin, signal.times, _unwrapped(signal.measured, signal.period)))
     return _nearest_goal(np.array([origin]), change.goal, signal.period) - origin
 
 
-def _goal_changes(signal: Signal, threshold: float) -> list[_Change]:
+def _goal_changes(signal: ControlledSignal, threshold: float) -> list[_SetpointChange]:
     """Return the changes of the set-point from one stretch in which it stands to the next."""
     assert signal.goal is not None
     known = np.isfinite(signal.goal)
@@ -305,7 +305,7 @@ def _goal_changes(signal: Signal, threshold: float) -> list[_Change]:
     reports = signal.stated if signal.stated is not None else times
     reports = reports[(reports >= times[0]) & (reports <= times[-1])]
     jump = max(JUMP_S, 2.05 * float(np.median(np.diff(reports)))) if len(reports) > 1 else JUMP_S
-    changes: list[_Change] = []
+    changes: list[_SetpointChange] = []
     before: int | None = None  # the last sample at which the set-point stood
     for begin, end in stands:
         level = float(np.median(goal[begin:end]))
@@ -322,19 +322,19 @@ def _goal_changes(signal: Signal, threshold: float) -> list[_Change]:
         if moved >= threshold:
             why = f"it never stands for {STANDS_S:g} s"
             at = float(times[rest[0]]), float(times[-1])
-            changes.append(_Change(at[0], at[0], at[1], float(goal[-1]), problem=why))
-    return [_dated(signal, one, reports) for one in changes if not _is_small(one, signal, threshold)]
+            changes.append(_SetpointChange(at[0], at[0], at[1], float(goal[-1]), problem=why))
+    return [_dated(signal, change, reports) for change in changes if not _is_small(change, signal, threshold)]
 
 
-def _is_small(change: _Change, signal: Signal, threshold: float) -> bool:
+def _is_small(change: _SetpointChange, signal: ControlledSignal, threshold: float) -> bool:
     return not change.problem and abs(_size(signal, change)) < threshold
 
 
 def _first_change(
-    signal: Signal, at: float, end: float, level: float, first: bool, threshold: float
-) -> list[_Change]:
+    signal: ControlledSignal, at: float, end: float, level: float, first: bool, threshold: float
+) -> list[_SetpointChange]:
     """Return the step to the first set-point that stands, if there was a moment at which it came."""
-    whole = _Change(at, at, end, level)
+    whole = _SetpointChange(at, at, end, level)
     if abs(_size(signal, whole)) < threshold:
         return []
     if not first:
@@ -345,7 +345,7 @@ def _first_change(
     return [whole]
 
 
-def _change(times: Array, goal: Array, tolerance: float, jump: float) -> _Change:
+def _change(times: Array, goal: Array, tolerance: float, jump: float) -> _SetpointChange:
     """Return the change between two samples at which the set-point stands.
 
     Args:
@@ -355,19 +355,19 @@ def _change(times: Array, goal: Array, tolerance: float, jump: float) -> _Change
         jump: longest time of a jump, s.
     """
     leaves, reaches = float(times[1]), float(times[-1])
-    found = _Change(leaves, reaches, reaches, float(goal[-1]))
+    change = _SetpointChange(leaves, reaches, reaches, float(goal[-1]))
     if np.max(np.diff(times)) > max(GAP_S, jump):
-        return found._replace(start=leaves, problem="the record has a gap there")
+        return change._replace(start=leaves, problem="the record has a gap there")
     moved = np.diff(goal)
     back = moved[np.sign(moved) != np.sign(goal[-1] - goal[0])]
     if np.sum(np.abs(back)) > 2.0 * tolerance:
-        return found._replace(start=leaves, problem="it moves to and fro before it stands")
+        return change._replace(start=leaves, problem="it moves to and fro before it stands")
     if reaches - times[0] <= jump:
-        return found._replace(start=leaves)
-    return found._replace(ramp=reaches - leaves)
+        return change._replace(start=leaves)
+    return change._replace(ramp=reaches - leaves)
 
 
-def _dated(signal: Signal, change: _Change, reports: Array) -> _Change:
+def _dated(signal: ControlledSignal, change: _SetpointChange, reports: Array) -> _SetpointChange:
     """Return the change with the time at which it was sent, or else that of its first report."""
     if change.problem or change.ramp or not len(reports):
         return change
@@ -381,7 +381,7 @@ def _dated(signal: Signal, change: _Change, reports: Array) -> _Change:
     return change._replace(start=report, resolution=report - earlier)
 
 
-def _movements(signal: Signal, threshold: float) -> list[_Change]:
+def _movements(signal: ControlledSignal, threshold: float) -> list[_SetpointChange]:
     """Return each movement from rest to rest, for a record without set-points."""
     times = signal.times
     values = _unwrapped(signal.measured, signal.period)
@@ -392,7 +392,7 @@ def _movements(signal: Signal, threshold: float) -> list[_Change]:
         level = float(np.median(values[begin:end]))
         if abs(level - values[left - 1]) >= threshold:
             start = float(times[left - 1])
-            changes.append(_Change(start, start, float(times[end - 1]), level))
+            changes.append(_SetpointChange(start, start, float(times[end - 1]), level))
     return changes
 
 
@@ -418,7 +418,7 @@ def _stretches(flags: NDArray[np.bool_], breaks: NDArray[np.bool_] | None = None
     return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
 
 
-def judge(signal: Signal, goal: float, start: float) -> StepResponse | None:
+def judge(signal: ControlledSignal, goal: float, start: float) -> StepResponse | None:
     """Return the figures of one response; ``None`` if it has too few samples.
 
     Args:
@@ -560,7 +560,7 @@ COLUMNS = (
 
 
 def as_record(
-    signal: Signal, responses: Sequence[StepResponse], not_judged: Sequence[NotJudged] = ()
+    signal: ControlledSignal, responses: Sequence[StepResponse], not_judged: Sequence[NotJudged] = ()
 ) -> dict[str, Any]:
     """Return what was found in a signal as plain data, ``None`` for what is unknown."""
 
@@ -573,8 +573,11 @@ def as_record(
         "controller": signal.controller,
         "set_point": signal.goal is not None,
         "steps": [
-            {**{name: plain(value) for name, value in one._asdict().items()}, "size": plain(one.size)}
-            for one in responses
+            {
+                **{name: plain(value) for name, value in response._asdict().items()},
+                "size": plain(response.size),
+            }
+            for response in responses
         ],
         "not_judged": [
             {"start": plain(one.start), "end": plain(one.end), "why": one.why} for one in not_judged

@@ -26,7 +26,7 @@ from volery.base.elementary import cos, sin
 from volery.base.errors import UsageError, VehicleError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, Ns, from_seconds, to_seconds
-from volery.control.actuation import Actuation, Command, Measured
+from volery.control.actuation import Actuation, MeasuredState, MotionCommand
 from volery.kernel.waiting import Rate
 from volery.vehicles import Drone
 from volery.vehicles.telemetry import Telemetry
@@ -67,7 +67,7 @@ HELP = "w s a d move · r f climb, descend · q e turn · space stop · l land �
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class TeleopLimits:
     """Greatest commands and their greatest changes.
 
     Attributes:
@@ -106,7 +106,7 @@ class Teleoperator:
         limits: limits of the commands.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: TeleopLimits) -> None:
         self._limits = limits
         self._intent = NOTHING
         self._at: Ns | None = None
@@ -117,7 +117,7 @@ class Teleoperator:
         """Take the newest input."""
         self._intent, self._at = intent, now
 
-    def command(self, now: Ns, heading: float) -> Command:
+    def command(self, now: Ns, heading: float) -> MotionCommand:
         """Return the command at *now* ns for a drone with *heading* in degrees."""
         held = self._at is not None and now - self._at <= DEAD_MAN
         wanted = self._intent if held else NOTHING
@@ -133,7 +133,7 @@ class Teleoperator:
         limits, (forward, right, up, turn) = self._limits, self._shares
         c, s = cos(radians(heading)), sin(radians(heading))
         north, east = forward * c - right * s, forward * s + right * c
-        return Command(north * limits.speed, east * limits.speed, up * limits.climb, turn * limits.turn)
+        return MotionCommand(north * limits.speed, east * limits.speed, up * limits.climb, turn * limits.turn)
 
 
 class Keyboard:
@@ -263,7 +263,7 @@ def describe_flight(seen: Telemetry) -> str:
         f"battery {seen.battery.remaining:.0%}",
         f"{away:.0f} m from home",
     )
-    known = (one.replace("nan%", "unknown").replace("nan", "?") for one in figures)
+    known = (figure.replace("nan%", "unknown").replace("nan", "?") for figure in figures)
     return " · ".join((seen.mode or "no mode", *known, *(("STALE",) if seen.stale else ())))
 
 
@@ -271,7 +271,7 @@ def teleoperate(
     drone: Drone,
     source: Input,
     actuation: Actuation,
-    limits: Limits,
+    limits: TeleopLimits,
     height: float,
     show: Callable[[str], None] = lambda _: None,
 ) -> str:
@@ -297,7 +297,9 @@ def teleoperate(
         showing.cancel()
 
 
-def _fly_by_hand(drone: Drone, source: Input, actuation: Actuation, limits: Limits, height: float) -> str:
+def _fly_by_hand(
+    drone: Drone, source: Input, actuation: Actuation, limits: TeleopLimits, height: float
+) -> str:
     kernel = drone.kernel
     if drone.flying:
         actuation.engage()
@@ -326,6 +328,6 @@ def _fly_by_hand(drone: Drone, source: Input, actuation: Actuation, limits: Limi
             drone.land()
             return lost
         seen = drone.telemetry
-        measured = Measured(seen.attitude.heading, 0.0, 0.0, seen.above_home, *seen.velocity)
+        measured = MeasuredState(seen.attitude.heading, 0.0, 0.0, seen.above_home, *seen.velocity)
         command = operator.command(now, seen.attitude.heading)
         actuation.apply(command, measured, to_seconds(PERIOD))

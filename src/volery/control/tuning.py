@@ -150,7 +150,7 @@ def _best_of_grid(
         misfits = np.std(seen - late * gains, axis=0)
         index = int(np.argmin(misfits))
         if misfits[index] < best.misfit:
-            frequency, damping, limit = (one[index] for one in copies)
+            frequency, damping, limit = (copy[index] for copy in copies)
             figures = (gains[index], frequency, damping, dead, gains[index] * limit, misfits[index])
             best = Process(*map(float, figures))
     return best
@@ -247,7 +247,7 @@ def simc(process: Process, base: PidGains, closed_s: float | None = None) -> Pid
 # -- scenarios
 
 
-class Scenario(NamedTuple):
+class TuningScenario(NamedTuple):
     """One test of a law.
 
     Attributes:
@@ -267,7 +267,9 @@ class Scenario(NamedTuple):
     gain: float
 
 
-def scenarios(steps: Sequence[float], noise: float, push: float, count: int, seed: int) -> list[Scenario]:
+def scenarios(
+    steps: Sequence[float], noise: float, push: float, count: int, seed: int
+) -> list[TuningScenario]:
     """Return random scenarios.
 
     Args:
@@ -279,7 +281,7 @@ def scenarios(steps: Sequence[float], noise: float, push: float, count: int, see
     """
     random = np.random.default_rng(seed)
     return [
-        Scenario(
+        TuningScenario(
             float(random.choice(steps)),
             float(random.uniform(0.0, 0.08)),
             float(random.choice([0.05, 0.05, 0.1])),
@@ -292,7 +294,7 @@ def scenarios(steps: Sequence[float], noise: float, push: float, count: int, see
 
 
 def cost(
-    gains: PidGains, process: Process, tests: Sequence[Scenario], seconds: float, seed: int = 1
+    gains: PidGains, process: Process, tests: Sequence[TuningScenario], seconds: float, seed: int = 1
 ) -> Array:
     """Return for each copy of the gains the mean IAE per unit of step over scenarios, in s.
 
@@ -305,19 +307,19 @@ def cost(
     """
     copies = max(np.size(getattr(gains, name)) for name in ("kp", "ki", "kd", "deceleration"))
     total = np.zeros(copies)
-    for sample_s in sorted({one.sample_s for one in tests}):
-        same = [one for one in tests if one.sample_s == sample_s]
+    for sample_s in sorted({test.sample_s for test in tests}):
+        same = [test for test in tests if test.sample_s == sample_s]
         total += _simulate(gains, process, same, seconds, copies, seed).sum(axis=1)
     return total / len(tests)
 
 
 def _simulate(
-    gains: PidGains, process: Process, tests: Sequence[Scenario], seconds: float, copies: int, seed: int
+    gains: PidGains, process: Process, tests: Sequence[TuningScenario], seconds: float, copies: int, seed: int
 ) -> Array:
     """Return the cost by copy and scenario; all scenarios have the same sample time."""
     sample_s = tests[0].sample_s
     step, delay, push, noise, factor = (
-        np.array([getattr(one, name) for one in tests])
+        np.array([getattr(test, name) for test in tests])
         for name in ("step", "delay_s", "push", "noise", "gain")
     )
     shape = (copies, len(tests))
@@ -362,7 +364,7 @@ LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN, GREATEST_SENSITIVITY = 2.0, 45.0, 2.0
 
 
 def optimise(
-    process: Process, start: PidGains, tests: Sequence[Scenario], seconds: float, seed: int = 1
+    process: Process, start: PidGains, tests: Sequence[TuningScenario], seconds: float, seed: int = 1
 ) -> PidGains:
     """Return gains that lower the cost over scenarios, among those with the least margins.
 

@@ -19,7 +19,7 @@ from volery.control.laws import PidGains
 from volery.control.tuning import Process, is_robust
 
 
-class Answer(NamedTuple):
+class LoopAnswer(NamedTuple):
     """How a vehicle answers the commands of a law, one process for each kind of loop.
 
     Their dead times are those without the wait for the next report of telemetry.
@@ -51,24 +51,24 @@ velocity to acceleration, an attitude that follows after 0.2 s, and a gain margi
 in all, and a report is late by half of its period on average.
 """
 
-VELOCITY_ANSWERS: Mapping[str, Answer] = {
-    "ArduPilot": Answer(
+VELOCITY_ANSWERS: Mapping[str, LoopAnswer] = {
+    "ArduPilot": LoopAnswer(
         Process(0.95, 18.0, 0.32, 0.4),
         Process(1.0, 9.8, 1.1, 0.28),
         Process(1.0, 4.7, 0.32, 0.01),
     ),
-    "PX4": Answer(
+    "PX4": LoopAnswer(
         Process(0.81, 5.8, 1.75, 0.0),
         Process(0.97, 12.0, 1.6, 0.0),
         Process(0.97, 8.8, 1.75, 0.0),
     ),
-    "DJI": Answer(
+    "DJI": LoopAnswer(
         Process(0.95, 28.0, 0.32, 0.38),
         Process(1.0, 9.8, 1.1, 0.28),
         Process(1.0, 6.5, 0.4, 0.13),
     ),
     # GUIDANCE_H_REF_* and the loops behind the reference: soft, with a swing of 1.35 rad/s
-    "Paparazzi": Answer(
+    "Paparazzi": LoopAnswer(
         Process(1.2, 1.35, 0.32, 0.41),
         Process(0.98, 5.8, 0.32, 0.0),
         Process(1.0, 6.5, 0.43, 0.1),
@@ -79,20 +79,20 @@ climb and 30 degrees/s that the simulated autopilots have flown.
 """
 SLOWEST = VELOCITY_ANSWERS["Paparazzi"]
 """Answer that is assumed of an autopilot without one here."""
-TILT_ANSWERS: Mapping[str, Answer] = {
-    "ArduPilot": Answer(
+TILT_ANSWERS: Mapping[str, LoopAnswer] = {
+    "ArduPilot": LoopAnswer(
         Process(0.93, 3.1, 0.37, 0.18),
         Process(1.0, 9.8, 1.1, 0.3),
         Process(1.0, 11.0, 1.75, 0.19),  # of 4.8, which follows turns later than 4.5
         TILT_WITHIN_S,
     ),
-    "PX4": Answer(
+    "PX4": LoopAnswer(
         Process(0.92, 3.1, 0.32, 0.22),
         Process(1.0, 2.5, 0.46, 0.0),
         Process(1.0, 6.5, 0.4, 0.07),
         TILT_WITHIN_S,
     ),
-    "DJI": Answer(
+    "DJI": LoopAnswer(
         Process(0.9, 2.8, 0.32, 0.19),
         Process(1.0, 9.8, 1.1, 0.28),
         Process(1.0, 6.5, 0.4, 0.1),
@@ -105,7 +105,7 @@ LEAST_SHARE = 1.0 / 16.0
 """Share of the gains below which a law is refused: it would take minutes for a step."""
 
 
-def answer_of(answers: Mapping[str, Answer], autopilot: str) -> Answer:
+def answer_of(answers: Mapping[str, LoopAnswer], autopilot: str) -> LoopAnswer:
     """Return the answer of an autopilot by its name, such as ``DJI A3``."""
     return answers.get(autopilot.partition(" ")[0], SLOWEST)
 

@@ -17,7 +17,6 @@ from volery.cost.catalogue import (
     read_catalogue,
 )
 from volery.cost.code_laws import (
-    Cache,
     CodeLaw,
     CoreLaw,
     IssueQueue,
@@ -25,6 +24,7 @@ from volery.cost.code_laws import (
     MemoryLaw,
     OperationTiming,
     PipeGroup,
+    SimulatedCache,
 )
 from volery.cost.figures import (
     Figure,
@@ -61,7 +61,6 @@ __all__ = [
     "UNIFORM_COSTS",
     "WRAPPED",
     "Basis",
-    "Cache",
     "CallFigures",
     "Catalogue",
     "CodeLaw",
@@ -85,6 +84,7 @@ __all__ = [
     "ProcessorEntry",
     "ProcessorPrices",
     "RosLaw",
+    "SimulatedCache",
     "StatedCost",
     "StatedPricing",
     "StepCounter",

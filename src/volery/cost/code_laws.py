@@ -101,7 +101,7 @@ class LibraryLaw(WithProvenance):
         return own, self.latencies.get(symbol, 2.0 * own)
 
 
-class Cache(BaseModel):
+class SimulatedCache(BaseModel):
     """A set-associative cache with lines of 64 bytes and least-recently-used replacement.
 
     ``latency`` is in cycles from a load that it serves to the use of the value. The first cache's latency is
@@ -123,7 +123,7 @@ class MemoryLaw(WithProvenance):
         bytes_per_ns: Bandwidth of memory for one core, bytes/ns.
     """
 
-    caches: tuple[Cache, ...] = Field(min_length=1, max_length=4)
+    caches: tuple[SimulatedCache, ...] = Field(min_length=1, max_length=4)
     latency_ns: float
     bytes_per_ns: float = Field(gt=0.0)
 

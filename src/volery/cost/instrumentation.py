@@ -408,7 +408,7 @@ def _is_text(operand: ast.expr) -> bool:
 
 
 def _are_constants(*operands: ast.expr) -> bool:
-    return all(isinstance(one, ast.Constant) for one in operands)
+    return all(isinstance(operand, ast.Constant) for operand in operands)
 
 
 def _index(index: ast.expr) -> ast.expr:

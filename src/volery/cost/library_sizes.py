@@ -53,7 +53,9 @@ def _elements(value: Any) -> int:
 
 def _arrays(values: Values) -> list[Any]:
     """Return the arrays of one dimension or more."""
-    return [one for one in values if type(one).__module__ == "numpy" and getattr(one, "shape", ()) != ()]
+    return [
+        value for value in values if type(value).__module__ == "numpy" and getattr(value, "shape", ()) != ()
+    ]
 
 
 def _products(arguments: Values, result: Any) -> float:
@@ -84,9 +86,9 @@ def _outcome(arguments: Values, result: Any) -> int:
 
 def _window(arguments: Values, result: Any) -> int:
     """Return the elements of a picture times what the side of a filter's window has beyond 3."""
-    sides = [max(one) for one in arguments[1:2] if isinstance(one, tuple) and one]
-    sides += [max(one.shape) for one in _arrays(arguments[1:2])]
-    sides += [one for one in arguments[1:2] if isinstance(one, int)]
+    sides = [max(argument) for argument in arguments[1:2] if isinstance(argument, tuple) and argument]
+    sides += [max(array.shape) for array in _arrays(arguments[1:2])]
+    sides += [argument for argument in arguments[1:2] if isinstance(argument, int)]
     return _elements(arguments[0]) * max(max(sides, default=3) - 3, 0) if arguments else 0
 
 
@@ -100,7 +102,7 @@ def _count(value: Any) -> int:
 
 def _pairs(arguments: Values, result: Any) -> int:
     """Return the pairs of rows of two arrays."""
-    counts = [len(one) for one in _arrays(arguments)[:2]]
+    counts = [len(array) for array in _arrays(arguments)[:2]]
     return counts[0] * counts[-1] if counts else 1
 
 
@@ -118,7 +120,7 @@ def _candidates(arguments: Values, result: Any) -> int:
 
 
 def _texts(values: Values) -> list[str | bytes | bytearray]:
-    return [one for one in values if isinstance(one, (str, bytes, bytearray))]
+    return [value for value in values if isinstance(value, (str, bytes, bytearray))]
 
 
 def _text(arguments: Values, result: Any) -> int:
@@ -178,7 +180,7 @@ def _joined(arrays: list[Any], shape: tuple[int, ...]) -> int:
         steps.append([0] * missing + own)
     inner = shape[-1]
     for axis in range(len(shape) - 2, -1, -1):
-        if any(one[axis] != one[axis + 1] * shape[axis + 1] for one in steps):
+        if any(step[axis] != step[axis + 1] * shape[axis + 1] for step in steps):
             break
         inner *= shape[axis]
     return max(inner, 1)
@@ -187,9 +189,9 @@ def _joined(arrays: list[Any], shape: tuple[int, ...]) -> int:
 def _strided(arguments: Values, result: Any) -> int:
     """Return the elements that are read with gaps between them."""
     return sum(
-        _array_elements(one)
-        for one in _arrays(arguments)
-        if one.shape[-1] > 1 and one.strides[-1] not in (one.itemsize, 0)
+        _array_elements(array)
+        for array in _arrays(arguments)
+        if array.shape[-1] > 1 and array.strides[-1] not in (array.itemsize, 0)
     )
 
 
@@ -201,7 +203,7 @@ def _cast(arguments: Values, result: Any) -> int:
     kind = getattr(result, "dtype", None)
     if kind is None or kind.kind == "b":
         kind = max(arrays, key=lambda one: (one.dtype.kind == "f", one.itemsize)).dtype
-    return sum(_array_elements(one) for one in arrays if one.dtype != kind)
+    return sum(_array_elements(array) for array in arrays if array.dtype != kind)
 
 
 def _selected(arguments: Values, result: Any) -> int:
@@ -220,7 +222,7 @@ def _rows(arguments: Values, result: Any) -> int:
 
 def _coordinates(arguments: Values, result: Any) -> int:
     """Return the elements of a mask of several dimensions, whose places are given for each dimension."""
-    masks = [one for one in _arrays(arguments) if len(one.shape) > 1]
+    masks = [array for array in _arrays(arguments) if len(array.shape) > 1]
     return sum(map(_array_elements, masks)) if isinstance(result, tuple) else 0
 
 
@@ -236,7 +238,7 @@ def _values(arguments: Values, result: Any) -> int:
 
 def _part_packed(arguments: Values, result: Any) -> float:
     """Return the bytes between which a packer finds matches, but poor ones: most where half remains."""
-    lengths = [len(one) for one in _texts((*arguments, result))]
+    lengths = [len(text) for text in _texts((*arguments, result))]
     if len(lengths) < 2:
         return 0.0
     long, short = max(lengths), min(lengths)

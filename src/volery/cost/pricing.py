@@ -189,9 +189,9 @@ class ProcessorPrices:
     def _scaled(self, component: str, what: str, figures: Sequence[StatedCost]) -> Cost:
         """Return the figure for this kind of processor that is stated at the nearest frequency, scaled."""
         kind = self.entry.name
-        fitting = [one for one in figures if one.processor == kind]
+        fitting = [figure for figure in figures if figure.processor == kind]
         if not fitting:
-            stated = choices({one.processor for one in figures})
+            stated = choices({figure.processor for figure in figures})
             raise EstimateError(
                 f"{component}: the time of {what!r} is stated for {stated}, but it is allocated to "
                 f"{self.name}, of kind {kind}: state one for {kind} as well"

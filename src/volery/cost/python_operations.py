@@ -131,7 +131,7 @@ def construction_operations(tree: ast.AST) -> dict[str, list[tuple[str, int]]]:
     These are the named tuples and dataclasses in ``tree``.
     """
     classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    return {one.name: operations for one in classes if (operations := _generated_init(one))}
+    return {klass.name: operations for klass in classes if (operations := _generated_init(klass))}
 
 
 def _generated_init(made: ast.ClassDef) -> list[tuple[str, int]]:

@@ -10,7 +10,7 @@ from volery.base.errors import UsageError
 from volery.components.cpp.sources import find_sources
 from volery.components.loader import imported_files, imported_names
 from volery.model.instances import Instance
-from volery.model.system import Processor, System
+from volery.model.system import ProcessorSpec, System
 from volery.ros.messages import Workspace
 from volery.run.assembly.cpp import is_cpp
 from volery.run.assembly.vehicle_nodes import graph_access
@@ -44,7 +44,7 @@ class Bridged:
 class Computer:
     """What one computer gets: a ROS package called ``package``."""
 
-    processor: Processor
+    processor: ProcessorSpec
     package: str
     hosted: tuple[Hosted, ...]
     bridged: tuple[Bridged, ...]
@@ -78,20 +78,22 @@ def _executes(computer: Computer) -> bool:
     return bool(computer.hosted or computer.bridged)
 
 
-def _computer(system: System, processor: Processor) -> Computer:
+def _computer(system: System, processor: ProcessorSpec) -> Computer:
     hosted = tuple(
-        Hosted(one, package_name(one.name)) for one in system.instances if one.processor == processor.name
+        Hosted(instance, package_name(instance.name))
+        for instance in system.instances
+        if instance.processor == processor.name
     )
     bridged = tuple(
         Bridged(
-            one.name,
-            one.autopilot,
-            graph_access(one.autopilot, one.name).namespace,
-            f"autopilot_{package_name(one.name)}",
-            f"vehicle_{package_name(one.name)}",
+            vehicle.name,
+            vehicle.autopilot,
+            graph_access(vehicle.autopilot, vehicle.name).namespace,
+            f"autopilot_{package_name(vehicle.name)}",
+            f"vehicle_{package_name(vehicle.name)}",
         )
-        for one in system.vehicles
-        if one.processor == processor.name
+        for vehicle in system.vehicles
+        if vehicle.processor == processor.name
     )
     packages = workspace_packages(system, tuple(one.instance for one in hosted))
     return Computer(processor, package_name(system.name, processor.name), hosted, bridged, packages)
@@ -108,7 +110,7 @@ def workspace_packages(system: System, instances: tuple[Instance, ...]) -> tuple
     """
     workspace = Workspace(system.folder)
     found: dict[str, None] = {}
-    for component in (one.component for one in instances):
+    for component in (instance.component for instance in instances):
         if not component.path or is_cpp(component):
             continue
         start = system.file_of(component)
@@ -132,7 +134,7 @@ def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tup
     Raises:
         UsageError: A file is outside the model's folder.
     """
-    wanted = {system.folder / one.name: None for one in system.sources}
+    wanted = {system.folder / source.name: None for source in system.sources}
     wanted |= dict.fromkeys(sorted(system.folder.glob("*.yaml")))  # what other scenarios include
     for one in instances:
         if one.component.path and not one.component.package:

@@ -53,7 +53,7 @@ def deploy(system: System, folder: Path, ros: int) -> Deployment:
     found = computers(system)
     verification = package_name(system.name, VERIFICATION)
     types = call_types(system)
-    surroundings = tuple(one for one in system.instances if one.is_environment)
+    surroundings = tuple(instance for instance in system.instances if instance.is_environment)
     contents: dict[str, tuple[Iterable[tuple[Path, str]], tuple[Instance, ...] | None]]
     contents = {types.package: (generator.interface_files(types, system), None)}
     for one in found:
@@ -117,9 +117,9 @@ def _copy_model(system: System, instances: tuple[Instance, ...], package: Path, 
         path = root / target
         path.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, path)
-    for one in system.instances:
-        if one.component.path and not one.component.package:
-            elsewhere = root / MODEL_FOLDER / one.component.path
+    for instance in system.instances:
+        if instance.component.path and not instance.component.package:
+            elsewhere = root / MODEL_FOLDER / instance.component.path
             if not elsewhere.exists():  # the model names it; this computer does not execute it
                 elsewhere.parent.mkdir(parents=True, exist_ok=True)
                 elsewhere.touch()

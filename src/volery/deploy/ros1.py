@@ -31,7 +31,7 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     packages = dict.fromkeys(
         ("rospy", "std_msgs", interfaces, *message_packages(computer), *computer.packages)
     )
-    depends = [f"<exec_depend>{one}</exec_depend>" for one in packages]
+    depends = [f"<exec_depend>{package}</exec_depend>" for package in packages]
     yield Path("package.xml"), package_xml(name, system, what, _TOOLS, depends)
     scripts = {one.executable: host_script(one, system, GRAPH, model) for one in computer.hosted}
     scripts |= {one.executable: bridge_script(one, GRAPH) for one in computer.bridged}
@@ -53,9 +53,9 @@ def verification_files(system: System, computers: Sequence[Computer]) -> Iterato
     yield Path("scripts") / "world", _SHEBANG + verification_script(system, GRAPH, model_expression(1))
     yield Path("launch") / "world.launch", _document(_world(name))
     included = [
-        f'<include file="$(find {one.package})/launch/{one.package}.launch">'
+        f'<include file="$(find {computer.package})/launch/{computer.package}.launch">'
         '<arg name="simulated" value="true"/></include>'
-        for one in computers
+        for computer in computers
     ]
     yield Path("launch") / f"{name}.launch", _document([*_world(name), *included])
 
@@ -71,7 +71,9 @@ def interface_files(types: CallTypes, system: System) -> Iterator[tuple[Path, st
     yield Path("package.xml"), package_xml(types.package, system, what, tools, depends)
     files = definition_files(types)
     yield from files.items()
-    listed = {kind: " ".join(one.name for one in files if one.parent.name == kind) for kind in ("msg", "srv")}
+    listed = {
+        kind: " ".join(file.name for file in files if file.parent.name == kind) for kind in ("msg", "srv")
+    }
     messages = f"add_message_files(FILES {listed['msg']})\n" if listed["msg"] else ""
     yield (
         Path("CMakeLists.txt"),
@@ -125,7 +127,7 @@ def _document(lines: Iterable[str]) -> str:
 
 
 def _cmake(name: str, scripts: Iterable[str], folders: Sequence[str]) -> str:
-    programs = " ".join(f"scripts/{one}" for one in scripts)
+    programs = " ".join(f"scripts/{script}" for script in scripts)
     return f"""cmake_minimum_required(VERSION 3.5)
 project({name} NONE)
 find_package(catkin REQUIRED)
@@ -141,4 +143,4 @@ def message_packages(computer: Computer) -> Iterator[str]:
         component = one.instance.component
         types = [topic.type for topic in component.publishes.values()]
         types += [topic.type for topic in component.subscribes.values()]
-        yield from (one.partition("/")[0] for one in types)
+        yield from (kind.partition("/")[0] for kind in types)

@@ -67,7 +67,7 @@ def interface_files(types: CallTypes, system: System) -> Iterator[tuple[Path, st
     yield Path("package.xml"), package_xml(types.package, system, what, tools, depends)
     files = definition_files(types)
     yield from files.items()
-    listed = "\n".join(f'  "{one}"' for one in files)
+    listed = "\n".join(f'  "{file}"' for file in files)
     yield (
         Path("CMakeLists.txt"),
         f"""cmake_minimum_required(VERSION 3.8)
@@ -86,7 +86,7 @@ ament_package()
 def _frame(
     name: str, system: System, what: str, packages: Iterable[str], executables: Sequence[str]
 ) -> Iterator[tuple[Path, str]]:
-    depends = [*(f"<exec_depend>{one}</exec_depend>" for one in packages), _EXPORT]
+    depends = [*(f"<exec_depend>{package}</exec_depend>" for package in packages), _EXPORT]
     yield Path("package.xml"), package_xml(name, system, what, (), depends)
     yield Path("resource") / name, ""
     yield (
@@ -98,7 +98,9 @@ def _frame(
 
 
 def _setup(name: str, what: str, executables: Sequence[str]) -> str:
-    scripts = "".join(f'            "{one} = {name}.{one}:main",\n' for one in executables)
+    scripts = "".join(
+        f'            "{executable} = {name}.{executable}:main",\n' for executable in executables
+    )
     return f'''from glob import glob
 
 from setuptools import setup
@@ -184,10 +186,8 @@ def _world_launch(name: str, computers: Sequence[Computer]) -> str:
         "        world,",
         "        RegisterEventHandler(ends),",
     ]
-    for one in computers:
-        source = (
-            f'PathJoinSubstitution([FindPackageShare("{one.package}"), "launch", "{one.package}.launch.py"])'
-        )
+    for computer in computers:
+        source = f'PathJoinSubstitution([FindPackageShare("{computer.package}"), "launch", "{computer.package}.launch.py"])'
         lines.append(
             f"        IncludeLaunchDescription(PythonLaunchDescriptionSource({source}), "
             'launch_arguments={"simulated": "true"}.items()),'

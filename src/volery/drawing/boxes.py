@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Port:
+class BoxPort:
     """A port of a box. Provided ones are on its left side with a lollipop, required ones on its right."""
 
     name: str
@@ -23,22 +23,22 @@ class Box:
     stereotype: str
     note: str = ""
     kind: str = "passive"
-    ports: tuple[Port, ...] = ()
+    ports: tuple[BoxPort, ...] = ()
     active: bool = False
 
     @property
-    def provided(self) -> list[Port]:
+    def provided(self) -> list[BoxPort]:
         """The ports on its left side."""
-        return [one for one in self.ports if one.provided]
+        return [port for port in self.ports if port.provided]
 
     @property
-    def required(self) -> list[Port]:
+    def required(self) -> list[BoxPort]:
         """The ports on its right side."""
-        return [one for one in self.ports if not one.provided]
+        return [port for port in self.ports if not port.provided]
 
 
 @dataclass(frozen=True)
-class Link:
+class BoxLink:
     """A required port and the provided port that it is connected to; ports are named."""
 
     source: str
@@ -53,7 +53,7 @@ class Diagram:
 
     title: str
     boxes: tuple[Box, ...]
-    links: tuple[Link, ...]
+    links: tuple[BoxLink, ...]
     frame: str = ""
     framed: frozenset[str] = frozenset()
     before: frozenset[str] = frozenset()

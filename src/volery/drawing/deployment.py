@@ -9,7 +9,7 @@ from math import ceil, sqrt
 from volery.base.time import to_seconds
 from volery.drawing.layers import LETTER, MARGIN, SMALL_LETTER
 from volery.drawing.shapes import LEGEND, document, legend, rect, text
-from volery.model.system import Network, Processor, System
+from volery.model.system import NetworkSpec, ProcessorSpec, System
 
 CHIP, GAP, DEPTH = 26.0, 8.0, 9.0
 """Height of a component within a computer, the gap between two, and the depth of a computer, px."""
@@ -28,7 +28,7 @@ BUS_COLOURS = ("#2f6fae", "#b0562f", "#3c8a5d", "#7a4fa3", "#a3812c")
 class _Computer:
     """A computer with its contents: texts and kinds of the chips."""
 
-    processor: Processor
+    processor: ProcessorSpec
     chips: tuple[tuple[str, str], ...]
     carrier: str
 
@@ -53,16 +53,16 @@ def deployment_svg(system: System) -> str:
 
     Computers on the ground stand above the networks if they fit into one row, all others below.
     """
-    computers = [_computer(system, one) for one in system.processors]
-    grounded = [one for one in computers if not one.carrier]
-    below = [one for one in computers if one.carrier]
+    computers = [_computer(system, processor) for processor in system.processors]
+    grounded = [computer for computer in computers if not computer.carrier]
+    below = [computer for computer in computers if computer.carrier]
     columns = _columns(len(below) or len(computers))
     if len(grounded) > max(columns, 4):
         grounded, below = [], computers
-    chips = [words for one in computers for words, _ in one.chips]
+    chips = [words for computer in computers for words, _ in computer.chips]
     width = max(
-        [210.0, *(len(one) * SMALL_LETTER * 1.12 + 44.0 for one in chips)]
-        + [len(_name(one)) * LETTER + 36.0 for one in computers]
+        [210.0, *(len(chip) * SMALL_LETTER * 1.12 + 44.0 for chip in chips)]
+        + [len(_name(computer)) * LETTER + 36.0 for computer in computers]
     )
     bus_top, places = _grid(grounded, max(columns, 4), width, 64.0)
     below_top = bus_top + BUS * len(system.networks) + 16.0
@@ -77,7 +77,9 @@ def deployment_svg(system: System) -> str:
         parts += _network(network, number, bus_top + BUS * number + BUS / 2, placed)
     for one in computers:
         parts += _draw(one, *places[one.processor.name], width)
-    parts += legend(list(dict.fromkeys(kind for one in computers for _, kind in one.chips)), bottom + 6)
+    parts += legend(
+        list(dict.fromkeys(kind for computer in computers for _, kind in computer.chips)), bottom + 6
+    )
     return document(max(right, len(heading) * 10.0) + MARGIN, bottom + LEGEND, parts)
 
 
@@ -87,14 +89,16 @@ def _columns(count: int) -> int:
     return max(1, ceil(count / rows))
 
 
-def _computer(system: System, processor: Processor) -> _Computer:
+def _computer(system: System, processor: ProcessorSpec) -> _Computer:
     chips = [
-        (f"{one.name}: {one.component.name}", "active" if one.activity else "passive")
-        for one in system.instances
-        if one.processor == processor.name
+        (f"{instance.name}: {instance.component.name}", "active" if instance.activity else "passive")
+        for instance in system.instances
+        if instance.processor == processor.name
     ]
     chips += [
-        (f"node of {one.name}", "vehicle") for one in system.vehicles if one.processor == processor.name
+        (f"node of {vehicle.name}", "vehicle")
+        for vehicle in system.vehicles
+        if vehicle.processor == processor.name
     ]
     carrier = ""
     if processor.carried_by:
@@ -143,7 +147,7 @@ def _draw(one: _Computer, x: float, y: float, width: float) -> Iterator[str]:
         yield text("port-name", middle, top + 17, words, "middle")
 
 
-def _network(network: Network, number: int, y: float, placed: _Placed) -> Iterator[str]:
+def _network(network: NetworkSpec, number: int, y: float, placed: _Placed) -> Iterator[str]:
     colour = BUS_COLOURS[number % len(BUS_COLOURS)]
     yield f'<path class="bus" stroke="{colour}" d="M{MARGIN:.1f} {y:.1f}H{placed.right:.1f}"/>'
     for name in network.between:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from volery.drawing.boxes import Box, Diagram, Link, Port
+from volery.drawing.boxes import Box, BoxLink, BoxPort, Diagram
 
 LETTER, SMALL_LETTER = 8.2, 6.2
 """Approximate widths of letters of titles and of small text, px."""
@@ -25,7 +25,7 @@ MARGIN = 40.0
 
 
 @dataclass(eq=False)
-class Place:
+class LayerSlot:
     """A box, or an empty place that a link passes through (``box`` None)."""
 
     box: Box | None
@@ -34,9 +34,9 @@ class Place:
     width: float
     x: float = 0.0
     y: float = 0.0
-    neighbours: list[tuple[Place, float, float]] = field(default_factory=list)
+    neighbours: list[tuple[LayerSlot, float, float]] = field(default_factory=list)
     """Those in the layer before, each with the distance of its port and of the own one from the tops."""
-    followers: list[tuple[Place, float, float]] = field(default_factory=list)
+    followers: list[tuple[LayerSlot, float, float]] = field(default_factory=list)
 
     @property
     def middle(self) -> float:
@@ -45,11 +45,11 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Route:
+class LinkRoute:
     """The places that a link passes, from its source to its target."""
 
-    link: Link
-    places: tuple[Place, ...]
+    link: BoxLink
+    places: tuple[LayerSlot, ...]
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Placed:
     """A diagram with places."""
 
     diagram: Diagram
-    places: dict[str, Place]
-    routes: tuple[Route, ...]
+    places: dict[str, LayerSlot]
+    routes: tuple[LinkRoute, ...]
     width: float
     height: float
 
@@ -73,10 +73,10 @@ def place(diagram: Diagram) -> Placed:
 
 def _with_sorted_ports(placed: Placed) -> Diagram:
     heights: dict[tuple[str, str], list[float]] = {}
-    for one in placed.routes:
-        heights.setdefault((one.link.source, one.link.source_port), []).append(one.places[1].middle)
+    for route in placed.routes:
+        heights.setdefault((route.link.source, route.link.source_port), []).append(route.places[1].middle)
 
-    def height(box: Box, port: Port) -> float:
+    def height(box: Box, port: BoxPort) -> float:
         found = heights.get((box.key, port.name), [])
         return sum(found) / len(found) if found else float("inf")
 
@@ -90,12 +90,14 @@ def _with_sorted_ports(placed: Placed) -> Diagram:
 
 def _place(diagram: Diagram) -> Placed:
     layers = _layers(diagram)
-    places = {one.key: Place(one, layers[one.key], box_height(one), box_width(one)) for one in diagram.boxes}
+    places = {
+        box.key: LayerSlot(box, layers[box.key], box_height(box), box_width(box)) for box in diagram.boxes
+    }
     routes, empty = _routes(diagram, places)
-    columns: list[list[Place]] = [[] for _ in range(max(layers.values(), default=0) + 1)]
+    columns: list[list[LayerSlot]] = [[] for _ in range(max(layers.values(), default=0) + 1)]
     for one in (*places.values(), *empty):
         columns[one.layer].append(one)
-    columns = [one for one in columns if one]
+    columns = [column for column in columns if column]
     _order(columns)
     _set_heights(columns)
     x = MARGIN
@@ -128,14 +130,14 @@ def box_width(box: Box) -> float:
 
 def port_height(box: Box, name: str, *, provided: bool) -> float:
     """Return the distance of a port from the top of its box, px."""
-    ports: Sequence[Port] = box.provided if provided else box.required
-    names = [one.name for one in ports]
+    ports: Sequence[BoxPort] = box.provided if provided else box.required
+    names = [port.name for port in ports]
     return HEAD + ROW * (names.index(name) + 0.5)
 
 
 def _layers(diagram: Diagram) -> dict[str, int]:
     """Return the layer of each box: callers of the frame, its boxes by longest path, then the rest."""
-    before: dict[str, list[str]] = {one.key: [] for one in diagram.boxes}
+    before: dict[str, list[str]] = {box.key: [] for box in diagram.boxes}
     for link in diagram.links:
         before[link.target].append(link.source)
     inner = {
@@ -173,10 +175,10 @@ def _longest(key: str, after: dict[str, list[str]], depth: dict[str, int]) -> No
             stack.pop()
 
 
-def _routes(diagram: Diagram, places: dict[str, Place]) -> tuple[list[Route], list[Place]]:
+def _routes(diagram: Diagram, places: dict[str, LayerSlot]) -> tuple[list[LinkRoute], list[LayerSlot]]:
     """Return the way of each link, with empty places in the layers between; one way a pair of boxes."""
-    empty: list[Place] = []
-    shared: dict[tuple[str, int], Place] = {}
+    empty: list[LayerSlot] = []
+    shared: dict[tuple[str, int], LayerSlot] = {}
     routes = []
     for link in diagram.links:
         source, target = places[link.source], places[link.target]
@@ -185,11 +187,11 @@ def _routes(diagram: Diagram, places: dict[str, Place]) -> tuple[list[Route], li
             key = f"{link.target}.{link.target_port}", layer
             thin = shared.get(key)
             if thin is None:
-                thin = shared[key] = Place(None, layer, THIN, 0.0)
+                thin = shared[key] = LayerSlot(None, layer, THIN, 0.0)
                 empty.append(thin)
             way.append(thin)
         way.append(target)
-        routes.append(Route(link, tuple(way)))
+        routes.append(LinkRoute(link, tuple(way)))
         for one, other in pairwise(way):
             there = port_height(one.box, link.source_port, provided=False) if one.box else THIN / 2
             here = port_height(other.box, link.target_port, provided=True) if other.box else THIN / 2
@@ -198,7 +200,7 @@ def _routes(diagram: Diagram, places: dict[str, Place]) -> tuple[list[Route], li
     return routes, empty
 
 
-def _order(columns: list[list[Place]]) -> None:
+def _order(columns: list[list[LayerSlot]]) -> None:
     """Order each column by the mean place of its neighbours, forwards and backwards."""
     for sweep in range(SWEEPS):
         forward = sweep % 2 == 0
@@ -215,7 +217,7 @@ def _order(columns: list[list[Place]]) -> None:
             column.sort(key=lambda one: keys[id(one)])
 
 
-def _set_heights(columns: list[list[Place]]) -> None:
+def _set_heights(columns: list[list[LayerSlot]]) -> None:
     for column in columns:
         y = 0.0
         for one in column:
@@ -239,7 +241,7 @@ def _set_heights(columns: list[list[Place]]) -> None:
             _spread(column, wanted)
 
 
-def _spread(column: Sequence[Place], wanted: Sequence[float]) -> None:
+def _spread(column: Sequence[LayerSlot], wanted: Sequence[float]) -> None:
     """Move the places of a column to the wanted heights, as near as their order and gaps allow.
 
     Places that would overlap form a block, which stands at the mean of what its members want.
@@ -260,7 +262,7 @@ def _spread(column: Sequence[Place], wanted: Sequence[float]) -> None:
             y += column[number].height + GAP_Y
 
 
-def _mean_top(column: Sequence[Place], wanted: Sequence[float], members: Iterable[int]) -> float:
+def _mean_top(column: Sequence[LayerSlot], wanted: Sequence[float], members: Iterable[int]) -> float:
     tops, y = [], 0.0
     for number in members:
         tops.append(wanted[number] - y)

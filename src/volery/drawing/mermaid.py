@@ -39,10 +39,10 @@ def _flowchart(diagram: Diagram) -> str:
     if diagram.frame:
         lines.append(f"  subgraph framed[{_text(diagram.frame)}]")
         lines += [
-            f"    {_node(one.key, one.title, one.kind)}" for one in diagram.boxes if one.key in diagram.framed
+            f"    {_node(box.key, box.title, box.kind)}" for box in diagram.boxes if box.key in diagram.framed
         ]
         lines.append("  end")
-    outside = [one for one in diagram.boxes if not (diagram.frame and one.key in diagram.framed)]
+    outside = [box for box in diagram.boxes if not (diagram.frame and box.key in diagram.framed)]
     lines += [f"{indent}{_node(one.key, one.title, one.kind)}" for one in outside]
     interfaces = {
         (box.key, port.name): port.interface for box in diagram.boxes for port in box.ports if port.provided
@@ -54,17 +54,17 @@ def _flowchart(diagram: Diagram) -> str:
 
 
 def _deployment(system: System) -> Iterator[str]:
-    for one in system.processors:
-        title = f"{one.name}: {one.kind}, {one.cores} × {one.frequency_mhz:g} MHz"
-        if one.carried_by:
-            title += f", on {one.carried_by}"
-        yield f"  subgraph {_id(one.name)}[{_text(title)}]"
+    for processor in system.processors:
+        title = f"{processor.name}: {processor.kind}, {processor.cores} × {processor.frequency_mhz:g} MHz"
+        if processor.carried_by:
+            title += f", on {processor.carried_by}"
+        yield f"  subgraph {_id(processor.name)}[{_text(title)}]"
         for instance in system.instances:
-            if instance.processor == one.name:
+            if instance.processor == processor.name:
                 kind = "active" if instance.activity else "passive"
                 yield f"    {_node(instance.name, f'{instance.name}: {instance.component.name}', kind)}"
         for vehicle in system.vehicles:
-            if vehicle.processor == one.name:
+            if vehicle.processor == processor.name:
                 yield f"    {_node(f'node of {vehicle.name}', f'node of {vehicle.name}', 'vehicle')}"
         yield "  end"
     for network in system.networks:
@@ -88,5 +88,5 @@ def _id(name: str) -> str:
 
 def _text(words: str) -> str:
     """Return quoted text; Mermaid reads entities such as ``#quot;``."""
-    safe = "".join(one if one.isalnum() or one in " _-:.,×/·" else f"#{ord(one)};" for one in words)
+    safe = "".join(word if word.isalnum() or word in " _-:.,×/·" else f"#{ord(word)};" for word in words)
     return f'"{safe}"'

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from volery.base.time import to_seconds
-from volery.model.components import Component, Figure, Interface
+from volery.model.components import Component, Interface, StatedFigure
 from volery.model.system import System
 
 PICTURES = {
@@ -35,31 +35,38 @@ def _lines(system: System, pictures: Mapping[str, str]) -> Iterator[str]:
         if view in pictures:
             yield f"\n![{caption}]({pictures[view]})"
     yield "\n## Interfaces\n"
-    yield from _table(("interface", "operations"), (_interface(one) for one in system.interfaces.values()))
+    yield from _table(
+        ("interface", "operations"), (_interface(interface) for interface in system.interfaces.values())
+    )
     yield "\n## Components\n"
     yield from _table(
         ("component", "language", "provides", "requires", "activation", "operations"),
-        (_component(one) for one in system.components.values()),
+        (_component(component) for component in system.components.values()),
     )
     yield "\n## Instances\n"
     yield from _table(
         ("instance", "component", "computer", "connected to"),
         (
             (
-                one.name,
-                one.component.name,
-                one.processor or "environment",
-                ", ".join(str(target) for link in one.connections.values() for target in link.targets),
+                instance.name,
+                instance.component.name,
+                instance.processor or "environment",
+                ", ".join(str(target) for link in instance.connections.values() for target in link.targets),
             )
-            for one in system.instances
+            for instance in system.instances
         ),
     )
     yield "\n## Requirements\n"
     yield from _table(
         ("requirement", "bound", "purpose"),
         (
-            (one.name, f"{one.observe} {one.relation} {one.bound:g} {one.unit}".strip(), one.description)
-            for one in system.requirements
+            (
+                requirement.name,
+                f"{requirement.observe} {requirement.relation} {requirement.bound:g}"
+                f" {requirement.unit}".strip(),
+                requirement.description,
+            )
+            for requirement in system.requirements
         ),
     )
 
@@ -96,7 +103,7 @@ def _component(one: Component) -> tuple[str, ...]:
     return one.name, one.language, provides, requires, ", ".join(words), "; ".join(operations)
 
 
-def _figure(one: Figure) -> str:
+def _figure(one: StatedFigure) -> str:
     return f"{one.time_ns / 1e6:g} ms on {one.processor} at {one.frequency_hz / 1e6:g} MHz"
 
 

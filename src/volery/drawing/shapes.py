@@ -7,7 +7,7 @@ from html import escape
 from itertools import pairwise
 
 from volery.drawing.boxes import Box
-from volery.drawing.layers import MARGIN, SMALL_LETTER, Placed, Route, place, port_height
+from volery.drawing.layers import MARGIN, SMALL_LETTER, LinkRoute, Placed, place, port_height
 from volery.drawing.views import functional, verification
 from volery.model.system import System
 
@@ -101,12 +101,12 @@ def document(width: float, height: float, parts: Iterator[str] | list[str]) -> s
 def _svg(placed: Placed) -> str:
     heading = f'<text class="heading" x="{MARGIN:.0f}" y="34">{text_of(placed.diagram.title)}</text>'
     parts = [heading, *_frame(placed)]
-    parts += [_link(one) for one in placed.routes]
-    sockets = {(one.link.target, one.link.target_port) for one in placed.routes}
+    parts += [_link(route) for route in placed.routes]
+    sockets = {(route.link.target, route.link.target_port) for route in placed.routes}
     for one in placed.places.values():
         if one.box is not None:
             parts += _box(one.box, one.x, one.y, one.width, one.height, sockets)
-    kinds = list(dict.fromkeys(one.kind for one in placed.diagram.boxes))
+    kinds = list(dict.fromkeys(box.kind for box in placed.diagram.boxes))
     parts += legend(kinds, placed.height)
     return document(placed.width, placed.height + LEGEND, parts)
 
@@ -133,7 +133,7 @@ def _frame(placed: Placed) -> Iterator[str]:
         yield text("frame-name", left + 14, top + 20, name)
 
 
-def _link(route: Route) -> str:
+def _link(route: LinkRoute) -> str:
     """Return a smooth line from the required port to the socket, through the places in between."""
     first, *between, last = route.places
     assert first.box is not None

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from volery.base.time import to_seconds
-from volery.drawing.boxes import Box, Diagram, Link, Port
+from volery.drawing.boxes import Box, BoxLink, BoxPort, Diagram
 from volery.model.components import ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.model.instances import Instance, TargetKind
 from volery.model.system import System
 
@@ -19,13 +19,17 @@ _INTERFACE_OF = {kind: interface for interface, kind in VEHICLE_INTERFACES.items
 
 def functional(system: System) -> Diagram:
     """Return the functional architecture: components with their ports, and who is connected to whom."""
-    boxes = [_component(one) for one in system.instances]
-    boxes += [_vehicle(one) for one in system.vehicles]
+    boxes = [_component(instance) for instance in system.instances]
+    boxes += [_vehicle(vehicle) for vehicle in system.vehicles]
     links = tuple(_links(system))
-    called = {one.target for one in links}
-    framed = frozenset(one.name for one in system.instances if not one.is_environment)
+    called = {link.target for link in links}
+    framed = frozenset(instance.name for instance in system.instances if not instance.is_environment)
     before = (
-        frozenset(one.name for one in system.instances if one.is_environment and one.name not in called)
+        frozenset(
+            instance.name
+            for instance in system.instances
+            if instance.is_environment and instance.name not in called
+        )
         - framed
     )
     return Diagram(system.name, tuple(boxes), links, system.name, framed, before)
@@ -33,29 +37,33 @@ def functional(system: System) -> Diagram:
 
 def verification(system: System) -> Diagram:
     """Return the verification environment: the system as one box, and what surrounds it in a run."""
-    inside = {one.name for one in system.instances if not one.is_environment}
-    around = [one for one in system.instances if one.is_environment]
+    inside = {instance.name for instance in system.instances if not instance.is_environment}
+    around = [instance for instance in system.instances if instance.is_environment]
     links = list(_links(system))
     incoming = dict.fromkeys(
-        (one.target, one.target_port) for one in links if one.source not in inside and one.target in inside
+        (link.target, link.target_port)
+        for link in links
+        if link.source not in inside and link.target in inside
     )
     outgoing = dict.fromkeys(
-        (one.target, one.target_port) for one in links if one.source in inside and one.target not in inside
+        (link.target, link.target_port)
+        for link in links
+        if link.source in inside and link.target not in inside
     )
     provided = _provided_interfaces(system)
-    ports = [Port(f"{name}.{port}", provided[name, port], provided=True) for name, port in incoming]
-    ports += [Port(name, provided[name, port], provided=False) for name, port in outgoing]
+    ports = [BoxPort(f"{name}.{port}", provided[name, port], provided=True) for name, port in incoming]
+    ports += [BoxPort(name, provided[name, port], provided=False) for name, port in outgoing]
     chosen = [f"allocation {system.allocation}"] if system.allocation else []
     chosen += [f"scenario {system.scenario}"] if system.scenario else []
     whole = Box(SYSTEM, system.name, "System", " · ".join(chosen), "system", tuple(ports))
-    boxes = [whole, *(_component(one) for one in around), *(_vehicle(one) for one in system.vehicles)]
-    kept = [one for one in links if one.source not in inside and one.target not in inside]
+    boxes = [whole, *(_component(one) for one in around), *(_vehicle(vehicle) for vehicle in system.vehicles)]
+    kept = [link for link in links if link.source not in inside and link.target not in inside]
     kept += [
-        Link(one.source, one.source_port, SYSTEM, f"{one.target}.{one.target_port}")
-        for one in links
-        if (one.target, one.target_port) in incoming and one.source not in inside
+        BoxLink(link.source, link.source_port, SYSTEM, f"{link.target}.{link.target_port}")
+        for link in links
+        if (link.target, link.target_port) in incoming and link.source not in inside
     ]
-    kept += [Link(SYSTEM, name, name, port) for name, port in outgoing]
+    kept += [BoxLink(SYSTEM, name, name, port) for name, port in outgoing]
     called = {one.target for one in kept}
     before = frozenset(one.name for one in around if one.name not in called)
     return Diagram(
@@ -78,9 +86,9 @@ def _component(one: Instance) -> Box:
     words += [f"uses {ENVIRONMENT_INTERFACE}"] * any(
         port.interface == ENVIRONMENT_INTERFACE for port in component.requires.values()
     )
-    ports = [Port(name, interface, provided=True) for name, interface in component.provides.items()]
+    ports = [BoxPort(name, interface, provided=True) for name, interface in component.provides.items()]
     ports += [
-        Port(port.name, port.interface, provided=False)
+        BoxPort(port.name, port.interface, provided=False)
         for port in component.requires.values()
         if port.interface != ENVIRONMENT_INTERFACE
     ]
@@ -90,25 +98,25 @@ def _component(one: Instance) -> Box:
                activity is not None)  # fmt: skip
 
 
-def _vehicle(one: Vehicle) -> Box:
-    port = Port(COMMANDS, _INTERFACE_OF[one.kind], provided=True)
+def _vehicle(one: VehicleSpec) -> Box:
+    port = BoxPort(COMMANDS, _INTERFACE_OF[one.kind], provided=True)
     return Box(one.name, one.name, one.kind, f"{one.autopilot} · at {one.at.name}", "vehicle", (port,))
 
 
-def _links(system: System) -> Iterator[Link]:
-    for one in system.instances:
-        for connection in one.connections.values():
+def _links(system: System) -> Iterator[BoxLink]:
+    for instance in system.instances:
+        for connection in instance.connections.values():
             for target in connection.targets:
                 if target.kind is TargetKind.INSTANCE:
-                    yield Link(one.name, connection.port, target.name, target.port)
+                    yield BoxLink(instance.name, connection.port, target.name, target.port)
                 elif target.kind is TargetKind.VEHICLE:
-                    yield Link(one.name, connection.port, target.name, COMMANDS)
+                    yield BoxLink(instance.name, connection.port, target.name, COMMANDS)
 
 
 def _provided_interfaces(system: System) -> dict[tuple[str, str], str]:
     found = {
-        (one.name, port): interface
-        for one in system.instances
-        for port, interface in one.component.provides.items()
+        (instance.name, port): interface
+        for instance in system.instances
+        for port, interface in instance.component.provides.items()
     }
-    return found | {(one.name, COMMANDS): _INTERFACE_OF[one.kind] for one in system.vehicles}
+    return found | {(vehicle.name, COMMANDS): _INTERFACE_OF[vehicle.kind] for vehicle in system.vehicles}

@@ -116,8 +116,8 @@ def _interfaces(tree: Mapping[str, Any]) -> Iterator[str]:
             yield from (f"subprogram {made}", *(["features", *parameters] if parameters else []))
             yield from (f"end {made};", "")
         features = [
-            f"  {identifier(one)}: provides subprogram access {name}_{identifier(one)};"
-            for one in operations or {}
+            f"  {identifier(operation)}: provides subprogram access {name}_{identifier(operation)};"
+            for operation in operations or {}
         ]
         yield from (f"subprogram group {name}", *(["features", *features] if features else []))
         yield from (f"end {name};", "")
@@ -186,7 +186,7 @@ def _hardware(tree: Mapping[str, Any], unmapped: Unmapped) -> Iterator[str]:
     for name, stated in (platform.get("processors") or {}).items():
         kind = f"{identifier(name)}_processor"
         buses = [one for one, network in networks.items() if name in network.get("between", [])]
-        features = [f"  {identifier(one)}: requires bus access {identifier(one)};" for one in buses]
+        features = [f"  {identifier(bus)}: requires bus access {identifier(bus)};" for bus in buses]
         protocol = _PROTOCOLS.get(stated.get("scheduler", ""), _PROTOCOLS["fixed-priority"])
         properties = [f"  Scheduling_Protocol => ({protocol});"]
         if stated.get("frequency"):

@@ -14,7 +14,7 @@ from typing import Any
 from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.files import read_bytes, write_text
 from volery.exchange.aadl import aadl_text
-from volery.exchange.launch.launch_model import Computer, launch_tree, read_launch
+from volery.exchange.launch.launch_model import LaunchComputer, launch_tree, read_launch
 from volery.exchange.launch.launch_reading import Packages
 from volery.exchange.launch.launch_text import launch_ending, launch_text
 from volery.exchange.notes import Note
@@ -145,12 +145,14 @@ _PATH = re.compile(r"components\.[^.]+\.path")
 def _outside(tree: Mapping[str, Any]) -> list[str]:
     """Return the folders of files outside the model's folder that ``files_from`` does not name."""
     components = (tree.get("components") or {}).values()
-    named = [str(one.get("path") or "") for one in components if isinstance(one, dict)]
+    named = [str(component.get("path") or "") for component in components if isinstance(component, dict)]
     world = (tree.get("environment") or {}).get("world")
     named += [world] if isinstance(world, str) else []
     allowed = [PurePath(one) for one in tree.get("files_from", [])]
     folders = {PurePath(one).parent: None for one in named if PurePath(one).parts[:1] == ("..",)}
-    return [one.as_posix() for one in folders if not any(one.is_relative_to(other) for other in allowed)]
+    return [
+        folder.as_posix() for folder in folders if not any(folder.is_relative_to(other) for other in allowed)
+    ]
 
 
 def uml_model(
@@ -220,7 +222,7 @@ def import_launch(
     out: Path,
     given: Mapping[str, str],
     packages: Packages,
-    computer: Computer,
+    computer: LaunchComputer,
     *,
     replace: bool = False,
 ) -> ImportedLaunch:
@@ -282,7 +284,7 @@ def _check_form(file: Path, vocabulary: Vocabulary) -> None:
     try:
         load(file, vocabulary)
     except CollectedModelError as several:
-        wrong = [one for one in several.errors if one.code in OF_THE_TEXT]
+        wrong = [error for error in several.errors if error.code in OF_THE_TEXT]
         if wrong:
             raise CollectedModelError(wrong) from None
     except ModelError as error:

@@ -165,7 +165,7 @@ def _times(stated: Mapping[str, Any]) -> Iterator[str]:
 def _platform(tree: Mapping[str, Any], unmapped: Unmapped) -> Iterator[str]:
     platform = tree.get("platform") or {}
     processors = platform.get("processors") or {}
-    for kind in dict.fromkeys(str(one.get("is")) for one in processors.values()):
+    for kind in dict.fromkeys(str(processor.get("is")) for processor in processors.values()):
         yield f"part def {name_text(kind)};"
     for kind in dict.fromkeys(
         str(one.get("kind")) for one in ((tree.get("environment") or {}).get("vehicles") or {}).values()

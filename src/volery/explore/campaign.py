@@ -28,10 +28,10 @@ from volery.explore.campaign_store import CampaignStore
 from volery.explore.executors import EngineLostError, open_executor
 from volery.explore.flight_phases import Phases, flight_phases
 from volery.explore.parquet_table import write_parquet
-from volery.explore.points import Point, Row, Value
+from volery.explore.points import CampaignRow, Value, VariantPoint
 from volery.explore.run_process import (
-    Setting,
-    Task,
+    CampaignSetting,
+    PlannedRun,
     execute,
     installed_version,
     model_digest,
@@ -45,7 +45,7 @@ from volery.model.builder import ModelBuilder
 from volery.model.text import CollectedModelError
 from volery.trace.events import Operation, VehicleState
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 TABLE_FILE: Final = "rows.parquet"
 UNDISTURBED: Final = "undisturbed"
@@ -139,13 +139,13 @@ class Campaign:
         return read_specification(self.stated["explore"])
 
     @property
-    def setting(self) -> Setting:
+    def setting(self) -> CampaignSetting:
         """What all its runs share."""
         stated, specification = self.stated, self.specification
         model: str | ModelBuilder | None = stated["model"] or self._model
         if model is None:
             raise UsageError(f"{self.folder}: its model was built in Python; give it as `model`")
-        return Setting(
+        return CampaignSetting(
             model,
             specification.fidelity,
             specification.limit_ns / S,
@@ -162,11 +162,11 @@ class Campaign:
         """Return how many finished runs have each status."""
         return self._store.statuses()
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[CampaignRow]:
         """Yield the finished rows in the order of their numbers; they are not held in memory."""
         return self._store.rows()
 
-    def row(self, run: int) -> Row:
+    def row(self, run: int) -> CampaignRow:
         """Return the row of a run. Raises ``UsageError`` if there is none."""
         found = self._store.row(run)
         if found is None:
@@ -193,7 +193,7 @@ class Campaign:
 
     # -- running
 
-    def evaluate(self, points: Sequence[Point]) -> list[Row]:
+    def evaluate(self, points: Sequence[VariantPoint]) -> list[CampaignRow]:
         """Run points and return their rows, in the order of *points*; rows that exist are not made again.
 
         The engine stays open for more of them until ``close``.
@@ -207,7 +207,7 @@ class Campaign:
         found = [self._store.find(point) for point in points]
         return [row for row in found if row is not None]
 
-    def run(self, points: Iterable[Point]) -> None:
+    def run(self, points: Iterable[VariantPoint]) -> None:
         """Run points that have no row yet. For many of them: none is held. Raises as ``evaluate``."""
         self._check_unchanged()
         self._store.close()
@@ -233,7 +233,7 @@ class Campaign:
             until: What is to be known how well, by ``statistics.read_until``.
 
         Returns:
-            The interval of each variant, by ``Point.variant``.
+            The interval of each variant, by ``VariantPoint.variant``.
 
         Raises:
             UsageError: As of ``evaluate``, or no run judges such a requirement.
@@ -242,7 +242,7 @@ class Campaign:
         for variant, grouped in groupby(self.specification.run_points(), lambda one: one.variant):
             points = list(grouped)
 
-            def interval_after(runs: int, points: list[Point] = points) -> Interval:
+            def interval_after(runs: int, points: list[VariantPoint] = points) -> Interval:
                 return until.interval(self.evaluate(points[:runs]))
 
             found[variant] = until.enough(interval_after, len(points))
@@ -283,8 +283,8 @@ class Campaign:
         run = simulate(system, Options(fidelity=self.setting.fidelity, seed=seed, out=folder))
         if not run.completed:
             raise UsageError(f"{folder}: the run without faults did not come to its regular end: {run.error}")
-        with Reading(folder / TRACE_FILE) as reading:
-            rovers = {one.name for one in system.vehicles if one.kind == "rover"}
+        with OpenTrace(folder / TRACE_FILE) as reading:
+            rovers = {vehicle.name for vehicle in system.vehicles if vehicle.kind == "rover"}
             phases = flight_phases(reading.events([VehicleState, Operation]), rovers)
         if not phases:
             raise UsageError(f"{folder}: no vehicle was armed, so there is no phase in which to try faults")
@@ -309,10 +309,10 @@ class Campaign:
             self._engine = open_executor(self._on, self._workers)
         executor, workers = self._engine
         waiting = 0
-        done: SimpleQueue[Future[Row]] = SimpleQueue()  # `wait` would look at all that wait
+        done: SimpleQueue[Future[CampaignRow]] = SimpleQueue()  # `wait` would look at all that wait
         unfinished = self._store.unfinished()
         progress = _ProgressClock(self._store, self._show)
-        finished: list[Row] = []
+        finished: list[CampaignRow] = []
         setting = self.setting
         try:
             while True:
@@ -336,7 +336,7 @@ class Campaign:
             self.leave_engine()
             raise
 
-    def _result(self, done: Future[Row], finished: Sequence[Row]) -> Row:
+    def _result(self, done: Future[CampaignRow], finished: Sequence[CampaignRow]) -> CampaignRow:
         """Return the row of a finished run. If the engine failed, keep the other rows first."""
         try:
             return done.result()
@@ -353,12 +353,14 @@ class Campaign:
             ) from error
 
 
-def _next_task(unfinished: Iterator[tuple[int, int, Point]], setting: Setting) -> Task | None:
+def _next_task(
+    unfinished: Iterator[tuple[int, int, VariantPoint]], setting: CampaignSetting
+) -> PlannedRun | None:
     found = next(unfinished, None)
     if found is None:
         return None
     run, attempts, point = found
-    return Task(setting, run, point, attempts + 1)
+    return PlannedRun(setting, run, point, attempts + 1)
 
 
 class _ProgressClock:
@@ -371,7 +373,7 @@ class _ProgressClock:
         self._statuses = store.statuses()
         self._began = self._last = time.monotonic()
 
-    def add(self, rows: Sequence[Row]) -> None:
+    def add(self, rows: Sequence[CampaignRow]) -> None:
         """Count finished rows, and report if it is time."""
         for row in rows:
             self._finished += 1
@@ -517,6 +519,6 @@ def _check_paths(model: str | Path | ModelBuilder, specification: Specification)
                 read_variant(source, {path: value})
             except ModelError as error:
                 errors = error.errors if isinstance(error, CollectedModelError) else [error]
-                wrong = [one for one in errors if one.code in WRONG_ALWAYS]
+                wrong = [error for error in errors if error.code in WRONG_ALWAYS]
                 if wrong:
                     raise wrong[0] from None

@@ -28,7 +28,7 @@ from volery.explore.campaign_figures import (
     thinned,
     tornado_chart,
 )
-from volery.explore.points import COMPLETED, DISCARDED, Point, Row, Value
+from volery.explore.points import COMPLETED, DISCARDED, CampaignRow, Value, VariantPoint
 from volery.explore.search import Front, Objective, front_of
 from volery.explore.sensitivity import MORRIS, FaultCampaign, Influences
 from volery.explore.statistics import Interval, Until, mean, probability
@@ -69,7 +69,7 @@ def of_front(front: Front) -> Findings:
     requirements = dict.fromkeys(name for one in shown for name in one.requirements)
     columns = (
         Column("variant"),
-        *(Column(str(one), numeric=True) for one in front.objectives),
+        *(Column(str(objective), numeric=True) for objective in front.objectives),
         *(Column(name, numeric=True) for name in requirements),
         Column("not distinguished from"),
     )
@@ -93,7 +93,7 @@ def of_front(front: Front) -> Findings:
         Grid("Pareto front", columns, tuple(rows)),
         Grid(share, (Column("reason"), Column("variants", numeric=True)), discarded),
     ]
-    return Findings(front.objectives, [one.values for one in front.solutions], grids=grids)
+    return Findings(front.objectives, [solution.values for solution in front.solutions], grids=grids)
 
 
 def _probability_cell(of: Interval | None) -> Cell:
@@ -105,8 +105,8 @@ def of_influences(influences: Influences) -> Findings:
     """Return what a sensitivity analysis found."""
     title = "mean size of elementary effects" if influences.method == MORRIS else "total Sobol index"
     effect = {
-        one.parameter: one.first if influences.method == MORRIS else one.total
-        for one in influences.parameters
+        parameter.parameter: parameter.first if influences.method == MORRIS else parameter.total
+        for parameter in influences.parameters
     }
     name = f"{title} on {influences.quantity}"
     columns = (Column("parameter"), Column("estimate", numeric=True), Column("95 % interval", numeric=True))
@@ -118,7 +118,7 @@ def of_influences(influences: Influences) -> Findings:
 
 
 def of_intervals(until: Until, intervals: Mapping[str, Interval]) -> Findings:
-    """Return what a stopping rule came to, by ``Point.variant``."""
+    """Return what a stopping rule came to, by ``VariantPoint.variant``."""
     columns = (Column("variant"), Column("how sure"))
     rows = [
         (
@@ -244,7 +244,7 @@ class _Table(NamedTuple):
         return flags
 
 
-def _collect(rows: Iterable[Row], measured: Sequence[Objective]) -> _Table:
+def _collect(rows: Iterable[CampaignRow], measured: Sequence[Objective]) -> _Table:
     numbers, statuses, variants = array("q"), [], array("q")
     parameters: dict[str, _Choices] = {}
     verdicts: dict[str, _Column] = {}
@@ -308,10 +308,12 @@ def write_page(campaign: Campaign, findings: Findings | None = None) -> Path:
 
 
 def _render(campaign: Campaign, found: Findings) -> str:
-    table = _collect(campaign.rows(), [one for one in found.objectives if one.measure is not None])
+    table = _collect(
+        campaign.rows(), [objective for objective in found.objectives if objective.measure is not None]
+    )
     if not len(table.numbers):
         raise UsageError(f"{campaign.folder}: no run is finished yet")
-    objectives = [one.name for one in found.objectives]
+    objectives = [objective.name for objective in found.objectives]
     unknown = [name for name in objectives if name not in table.observables]
     if unknown:
         raise UsageError(
@@ -353,7 +355,7 @@ def _render(campaign: Campaign, found: Findings) -> str:
             outcome=_outcome(asked, finished),
             facts=_facts(table),
             warnings=_warnings(table, asked, finished),
-            sections=[one for one in sections if one.figures or one.grid],
+            sections=[section for section in sections if section.figures or section.grid],
             runs=[_run(table, int(index), shown, links) for index in drawn],
             runs_title=f"the {len(drawn)} runs that are drawn"
             if len(drawn) < len(table.numbers)
@@ -531,12 +533,16 @@ def _most_varied(table: _Table, most: int = 3) -> list[str]:
 def _front(table: _Table, found: Findings) -> Flags:
     """Return which runs belong to the front: as it was found, else to variants with means none dominates."""
     if found.front is not None:
-        wanted = {Point(values).variant for values in found.front}
-        best = {index for index, values in enumerate(table.variant_values) if Point(values).variant in wanted}
+        wanted = {VariantPoint(values).variant for values in found.front}
+        best = {
+            index
+            for index, values in enumerate(table.variant_values)
+            if VariantPoint(values).variant in wanted
+        }
     elif len(found.objectives) < 2:
         best = set()
     else:
-        signs = [-1.0 if one.maximise else 1.0 for one in found.objectives]
+        signs = [-1.0 if objective.maximise else 1.0 for objective in found.objectives]
         means = [sign * _means(table, one.name) for sign, one in zip(signs, found.objectives, strict=True)]
         scores = np.column_stack(means)
         met = np.bincount(table.variants, weights=table.met, minlength=len(scores))

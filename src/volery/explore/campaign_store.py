@@ -30,7 +30,7 @@ import numpy as np
 
 from volery.base.errors import UsageError, VoleryError
 from volery.base.files import replace_text
-from volery.explore.points import Point, Row
+from volery.explore.points import CampaignRow, VariantPoint
 
 SCHEMA: Final = "volery-campaign/1"
 SPECIFICATION_FILE: Final = "campaign.json"
@@ -123,7 +123,7 @@ class CampaignStore:
 
     # -- writing
 
-    def ask(self, points: Iterable[Point]) -> None:
+    def ask(self, points: Iterable[VariantPoint]) -> None:
         """Add runs for points that have none yet; they get the next numbers, in the order of *points*."""
         with self._guarded(), self._transaction():
             known: dict[str, int] = {}
@@ -140,7 +140,7 @@ class CampaignStore:
                     (known[variant], point.seed),
                 )
 
-    def record(self, rows: Sequence[Row], started: Sequence[int] = ()) -> None:
+    def record(self, rows: Sequence[CampaignRow], started: Sequence[int] = ()) -> None:
         """Write finished rows, and count an attempt of the runs that have *started*, in one transaction."""
         with self._guarded(), self._transaction():
             for row in rows:
@@ -203,20 +203,22 @@ class CampaignStore:
         found = self._query("SELECT status, COUNT(*) FROM runs WHERE status NOT NULL GROUP BY status")
         return dict(found.fetchall())
 
-    def find(self, point: Point) -> Row | None:
+    def find(self, point: VariantPoint) -> CampaignRow | None:
         """Return the row of a point; None if its run is not finished."""
         where = " WHERE point = ? AND seed = ? AND status NOT NULL"
         return next(self._read(_SELECT + where, (point.variant, point.seed)), None)
 
-    def row(self, run: int) -> Row | None:
+    def row(self, run: int) -> CampaignRow | None:
         """Return the row of a run, its status empty if it is not finished; None if there is no such run."""
         return next(self._read(_SELECT + " WHERE run = ?", (run,)), None)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[CampaignRow]:
         """Yield the finished rows in the order of their runs, without holding all of them."""
         yield from self._read(_SELECT + " WHERE status NOT NULL ORDER BY run", ())
 
-    def unfinished(self, points: Iterable[Point] | None = None) -> Iterator[tuple[int, int, Point]]:
+    def unfinished(
+        self, points: Iterable[VariantPoint] | None = None
+    ) -> Iterator[tuple[int, int, VariantPoint]]:
         """Yield run, attempts so far and point of what is not finished; by default of all that was asked."""
         if points is None:
             after = -1
@@ -227,7 +229,7 @@ class CampaignStore:
                     (after,),
                 ).fetchall()
                 for run, attempt, variant, seed in found:
-                    yield run, attempt, Point(json.loads(variant), seed)
+                    yield run, attempt, VariantPoint(json.loads(variant), seed)
                 if not found:
                     return
                 after = found[-1][0]
@@ -240,16 +242,16 @@ class CampaignStore:
             for run, attempt in found:
                 yield run, attempt, point
 
-    def _read(self, query: str, values: tuple[Any, ...]) -> Iterator[Row]:
+    def _read(self, query: str, values: tuple[Any, ...]) -> Iterator[CampaignRow]:
         names = {table: list(self._read_names(table)) for table in self._names}
         for found in self._query(query, values):
             run, variant, seed, attempt, status, reason, verdicts, observed, sim_s, wall_s, cpu_s, host = (
                 found
             )
             numbers = array("d", observed or b"")
-            yield Row(
+            yield CampaignRow(
                 run,
-                Point(json.loads(variant), seed),
+                VariantPoint(json.loads(variant), seed),
                 status or "",
                 reason or "",
                 {
@@ -317,7 +319,7 @@ class CampaignStore:
         return {
             "run": whole[0],
             "seed": whole[1],
-            **{f"set.{path}": [values[one].get(path) for one in variants] for path in paths},
+            **{f"set.{path}": [values[variant].get(path) for variant in variants] for path in paths},
             "status": texts[0],
             "reason": texts[1],
             **{

@@ -70,19 +70,19 @@ def flight_phases(events: Iterable[Event], on_ground: Collection[str] = ()) -> P
 
 def _of_vehicle(states: list[VehicleState], *, flies: bool) -> Iterable[tuple[str, Ns]]:
     """Yield name and time of the phases of one vehicle."""
-    armed = np.array([one.armed for one in states])
+    armed = np.array([state.armed for state in states])
     if not armed.any():
         return
     first, last = int(np.argmax(armed)), len(states) - 1
     yield ARMING, states[first].at
-    along = np.array([hypot(one.vx, one.vy) for one in states])
-    up = np.array([one.vz for one in states])
+    along = np.array([hypot(state.vx, state.vy) for state in states])
+    up = np.array([state.vz for state in states])
     fast = along >= max(0.5 * float(along[armed].max()), STILL_M_S)
     still = np.hypot(along, up) < STILL_M_S
     if not flies:
         yield from _stretches(states, {DRIVE: armed & fast, HALT: armed & still})
         return
-    heights = np.array([one.where()[2] for one in states])
+    heights = np.array([state.where()[2] for state in states])
     aloft = armed & (heights > min(heights[first], heights[last]) + ABOVE_GROUND_M)
     if not aloft.any():
         return

@@ -67,15 +67,15 @@ def _arrow_array(values: Any, kind: pa.DataType) -> pa.Array[Any]:
 
     if isinstance(values, np.ndarray):
         return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
-    known = pa.py_buffer(_bits([one is not None for one in values]))
+    known = pa.py_buffer(_bits([value is not None for value in values]))
     if pa.types.is_string(kind):
-        texts = [b"" if one is None else str(one).encode() for one in values]
+        texts = [b"" if value is None else str(value).encode() for value in values]
         ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
         data = [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
     elif pa.types.is_boolean(kind):
-        data = [pa.py_buffer(_bits([bool(one) for one in values]))]
+        data = [pa.py_buffer(_bits([bool(value) for value in values]))]
     else:
-        numbers = np.array([one or 0 for one in values], dtype=kind.to_pandas_dtype())
+        numbers = np.array([value or 0 for value in values], dtype=kind.to_pandas_dtype())
         data = [pa.py_buffer(numbers)]
     return pa.Array.from_buffers(kind, len(values), [known, *data])
 

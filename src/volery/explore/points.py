@@ -33,7 +33,7 @@ since an analysis shows that it cannot meet its requirements."""
 
 
 @dataclass(frozen=True)
-class Point:
+class VariantPoint:
     """One variant of a model and a seed.
 
     Attributes:
@@ -58,7 +58,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Row:
+class CampaignRow:
     """One run of a campaign.
 
     Rows of the same point are equal on every machine but for the last four fields.
@@ -79,7 +79,7 @@ class Row:
     """
 
     run: int
-    point: Point
+    point: VariantPoint
     status: str = COMPLETED
     reason: str = ""
     verdicts: Mapping[str, bool | None] = field(default_factory=dict)
@@ -109,5 +109,5 @@ class Row:
 class Evaluate(Protocol):
     """Runs points: ``Campaign.evaluate``, or in a test a function that makes the rows itself."""
 
-    def __call__(self, points: Sequence[Point], /) -> list[Row]:
+    def __call__(self, points: Sequence[VariantPoint], /) -> list[CampaignRow]:
         """Return a row for each point, in the order of *points*; rows that exist are not made again."""

@@ -45,9 +45,9 @@ from volery.explore.points import (
     PATHS,
     SCENARIO,
     SELECTED,
-    Point,
-    Row,
+    CampaignRow,
     Value,
+    VariantPoint,
 )
 from volery.model.builder import ModelBuilder
 from volery.model.system import System
@@ -80,7 +80,7 @@ class StoppedError(VoleryError):
 
 
 @dataclass(frozen=True)
-class Setting:
+class CampaignSetting:
     """What all runs of a campaign share.
 
     Attributes:
@@ -101,12 +101,12 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Task:
+class PlannedRun:
     """A run to be made."""
 
-    setting: Setting
+    setting: CampaignSetting
     run: int
-    point: Point
+    point: VariantPoint
     attempt: int = 1
 
 
@@ -129,7 +129,11 @@ def model_digest(system: System) -> str:
     digest = hashlib.sha256()
     for source in system.sources:
         digest.update(f"{source.name}\0{source.text}\0".encode())
-    files = {one.path: system.file_of(one) for one in system.components.values() if one.path}
+    files = {
+        component.path: system.file_of(component)
+        for component in system.components.values()
+        if component.path
+    }
     for name, path in sorted(files.items()):
         digest.update(f"{name}\0".encode())
         with suppress(OSError):
@@ -157,7 +161,7 @@ def read_variant(model: str | ModelBuilder, values: Mapping[str, Value]) -> Syst
 # -- in the process of a worker
 
 
-def execute(task: Task) -> Row:
+def execute(task: PlannedRun) -> CampaignRow:
     """Make a run and return its row; whatever happens to the run is a row.
 
     Raises:
@@ -184,8 +188,8 @@ def stop_processes() -> None:
     _processes.stop()
 
 
-def _ended(task: Task, status: str, reason: str, wall_s: float, attempt: int = 1) -> Row:
-    return Row(
+def _ended(task: PlannedRun, status: str, reason: str, wall_s: float, attempt: int = 1) -> CampaignRow:
+    return CampaignRow(
         task.run, task.point, status, reason, wall_s=wall_s, host=socket.gethostname(), attempt=attempt
     )
 
@@ -221,7 +225,7 @@ class _Template:
         """Whether it can fork."""
         return self._process.poll() is None
 
-    def fork(self, task: Task) -> tuple[int, Connection]:
+    def fork(self, task: PlannedRun) -> tuple[int, Connection]:
         """Return number and link of a new process for runs such as *task*. Raises ``OSError`` if it died."""
         ours, theirs = socket.socketpair()
         with self._guard, theirs:
@@ -259,7 +263,7 @@ class RunProcess:
         task: Its first run.
     """
 
-    def __init__(self, template: _Template, task: Task) -> None:
+    def __init__(self, template: _Template, task: PlannedRun) -> None:
         self._template = template
         self._status: int | None = None
         self._pid, self._link = template.fork(task)
@@ -271,7 +275,7 @@ class RunProcess:
             self._status = self._template.exit_status(self._pid)
         return self._status is None
 
-    def make(self, task: Task) -> Row | None:
+    def make(self, task: PlannedRun) -> CampaignRow | None:
         """Return the row of a run; None if the process was killed from outside."""
         setting = task.setting
         wall_s = 0.0
@@ -291,7 +295,7 @@ class RunProcess:
             return _ended(task, CRASHED, f"its process ended {how}", wall_s)
         if isinstance(answer, VoleryError):
             raise answer
-        if isinstance(answer, Row):
+        if isinstance(answer, CampaignRow):
             return answer
         self.kill()
         much = f"its process used more than its limit of {setting.memory_mb:g} MB"
@@ -346,7 +350,7 @@ class _Processes:
         self._starter: ThreadPoolExecutor | None = None
 
     @contextmanager
-    def taken(self, task: Task) -> Iterator[RunProcess]:
+    def taken(self, task: PlannedRun) -> Iterator[RunProcess]:
         """Return a process for a run."""
         stops = self._stops
         with self._guard:
@@ -361,7 +365,7 @@ class _Processes:
                     self._idle.append(process)
         self._check(stops)
 
-    def _new(self, task: Task, stops: int) -> RunProcess:
+    def _new(self, task: PlannedRun, stops: int) -> RunProcess:
         """Return a new process; its template is started anew if it died."""
         for _ in range(ATTEMPTS):
             self._check(stops)
@@ -440,7 +444,7 @@ class _Maker:
         self._systems: OrderedDict[tuple[bytes, str], System] = OrderedDict()
         self._compiled: set[bytes] = set()
 
-    def prepare(self, task: Task) -> None:
+    def prepare(self, task: PlannedRun) -> None:
         """Read and compile what runs such as *task* need. What is wrong is said when the run is made."""
         with suppress(Exception):
             self._system(task)
@@ -454,7 +458,7 @@ class _Maker:
                 task = link.recv()
                 link.send(self.made(task, lambda: link.send(BEGINS)))
 
-    def made(self, task: Task, begins: Callable[[], None]) -> Row | VoleryError:
+    def made(self, task: PlannedRun, begins: Callable[[], None]) -> CampaignRow | VoleryError:
         """Make a run and return its row, or the error that ends the campaign.
 
         *begins* is called when all that it needs has been read and compiled.
@@ -468,15 +472,15 @@ class _Maker:
         except VersionMismatchError as error:
             return error
         except (ModelError, UsageError) as error:
-            row = Row(task.run, task.point, INVALID, str(error))
+            row = CampaignRow(task.run, task.point, INVALID, str(error))
         except MemoryError:
-            row = Row(task.run, task.point, OVER_MEMORY, "no memory was left")
+            row = CampaignRow(task.run, task.point, OVER_MEMORY, "no memory was left")
         except Exception as error:
-            row = Row(task.run, task.point, FAILED, f"{type(error).__name__}: {error}")
+            row = CampaignRow(task.run, task.point, FAILED, f"{type(error).__name__}: {error}")
         wall_s, cpu_s = time.monotonic() - began, _used_s() - used
         return replace(row, wall_s=wall_s, cpu_s=cpu_s, host=socket.gethostname())
 
-    def _system(self, task: Task) -> System:
+    def _system(self, task: PlannedRun) -> System:
         setting = pickle.dumps(task.setting)
         key = (setting, task.point.variant)
         if key not in self._systems:
@@ -493,7 +497,7 @@ class _Maker:
         return self._systems[key]
 
 
-def _check_digest(setting: Setting) -> None:
+def _check_digest(setting: CampaignSetting) -> None:
     if setting.digest and setting.digest != (mine := model_digest(read_variant(setting.model, {}))):
         raise VersionMismatchError(
             f"{setting.model} on {socket.gethostname()} differs from the coordinator's (digest {mine}, not "
@@ -513,7 +517,7 @@ def _compile(system: System, fidelity: str) -> None:
         RunSession(system, Options(fidelity=fidelity)).leave()
 
 
-def run_row(task: Task, system: System, out: Path | None = None) -> Row:
+def run_row(task: PlannedRun, system: System, out: Path | None = None) -> CampaignRow:
     """Run a variant and return its row, without what differs from machine to machine.
 
     Args:
@@ -527,7 +531,7 @@ def run_row(task: Task, system: System, out: Path | None = None) -> Row:
     run = simulate(system, Options(fidelity=task.setting.fidelity, seed=task.point.seed, out=out))
     outcome = run.record.outcome
     completed = outcome.status == COMPLETED
-    return Row(
+    return CampaignRow(
         task.run,
         task.point,
         COMPLETED if completed else FAILED,

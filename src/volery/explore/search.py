@@ -30,7 +30,7 @@ from volery.analysis.hardware import hardware, hardware_price
 from volery.analysis.impossible import why_impossible
 from volery.base.errors import ModelError, UsageError
 from volery.base.installed import require_extra
-from volery.explore.points import Evaluate, Point, Row, Value
+from volery.explore.points import CampaignRow, Evaluate, Value, VariantPoint
 from volery.explore.run_process import read_variant
 from volery.explore.space import Choices, Parameter, Space
 from volery.explore.specification import run_seed
@@ -66,9 +66,9 @@ class Objective:
 
     name: str
     maximise: bool = False
-    measure: Callable[[Row], float] | None = None
+    measure: Callable[[CampaignRow], float] | None = None
 
-    def value(self, row: Row) -> float:
+    def value(self, row: CampaignRow) -> float:
         """Return the quantity of a row; NaN if the run did not complete or did not observe it."""
         if not row.completed:
             return nan
@@ -96,7 +96,7 @@ class Solution:
     """A variant of the front, or one that cannot be distinguished from a variant of the front.
 
     Attributes:
-        values: What the variant sets, as of ``Point``.
+        values: What the variant sets, as of ``VariantPoint``.
         objectives: Interval of the mean of each objective, as it is observed.
         requirements: Interval of the probability to meet each constraint, by its name.
         like: Place in the front of the variant that this one cannot be distinguished from; None in the front.
@@ -139,7 +139,10 @@ class Front:
     def points(self) -> Array:
         """Return the estimates of the objectives to minimise, by solution and objective."""
         signs = _signs(self.objectives)
-        return np.array([[one.estimate for one in each.objectives] for each in self.solutions]) * signs
+        return (
+            np.array([[objective.estimate for objective in each.objectives] for each in self.solutions])
+            * signs
+        )
 
 
 Discard = Callable[[Mapping[str, Value]], str]
@@ -189,7 +192,9 @@ def search(  # noqa: PLR0913  # each is an option
     Raises:
         UsageError: No objective or more than three, one of them twice, an empty space, or numbers below 1.
     """
-    stated = tuple(read_objective(one) if isinstance(one, str) else one for one in objectives)
+    stated = tuple(
+        read_objective(objective) if isinstance(objective, str) else objective for objective in objectives
+    )
     if not 1 <= len(stated) <= 3 or len({one.name for one in stated}) < len(stated):
         raise UsageError(f"a search has one to three different objectives, not {len(stated)}")
     if not space:
@@ -259,7 +264,7 @@ class _Search:
 
         A variant beyond that number is None.
         """
-        keys = [Point(values).variant for values in variants]
+        keys = [VariantPoint(values).variant for values in variants]
         new: dict[str, Mapping[str, Value]] = {}
         for key, values in zip(keys, variants, strict=True):
             if key in self._known or key in new or len(new) >= most:
@@ -273,22 +278,28 @@ class _Search:
         for (key, values), rows in zip(
             new.items(), self._rows(list(new.values()), range(self._repetitions)), strict=True
         ):
-            self._judged.update(dict.fromkeys(name for one in rows for name in one.verdicts))
-            unmet = tuple(_unmet(rows, one) for one in self._constraints)
+            self._judged.update(dict.fromkeys(name for row in rows for name in row.verdicts))
+            unmet = tuple(_unmet(rows, constraint) for constraint in self._constraints)
             self._known[key] = _Variant(values, self._scores(rows).mean(axis=0), unmet)
         return [self._known.get(key) for key in keys]
 
-    def _rows(self, variants: Sequence[Mapping[str, Value]], repetitions: range) -> Iterator[list[Row]]:
+    def _rows(
+        self, variants: Sequence[Mapping[str, Value]], repetitions: range
+    ) -> Iterator[list[CampaignRow]]:
         """Yield the rows of each variant; a repetition has the same seed in all of them."""
-        points = [Point(values, run_seed(self._seed, one)) for values in variants for one in repetitions]
+        points = [
+            VariantPoint(values, run_seed(self._seed, repetition))
+            for values in variants
+            for repetition in repetitions
+        ]
         self._runs += len(points)
         rows = self._evaluate(points) if points else []
         for place in range(len(variants)):
             yield rows[place * len(repetitions) : (place + 1) * len(repetitions)]
 
-    def _scores(self, rows: Iterable[Row]) -> Array:
+    def _scores(self, rows: Iterable[CampaignRow]) -> Array:
         """Return what is to be minimised, by row and objective."""
-        values = [[one.value(row) for one in self._objectives] for row in rows]
+        values = [[objective.value(row) for objective in self._objectives] for row in rows]
         found: Array = np.array(values, dtype=float) * _signs(self._objectives)
         return found
 
@@ -360,7 +371,9 @@ class _Search:
             dict(self._reasons),
         )  # fmt: skip
 
-    def _solution(self, one: _Variant, rows: list[Row], level: float, like: int | None = None) -> Solution:
+    def _solution(
+        self, one: _Variant, rows: list[CampaignRow], level: float, like: int | None = None
+    ) -> Solution:
         values = self._scores(rows) * _signs(self._objectives)
         return Solution(
             one.values,
@@ -370,19 +383,19 @@ class _Search:
         )
 
 
-def _unmet(rows: Sequence[Row], requirement: str) -> float:
+def _unmet(rows: Sequence[CampaignRow], requirement: str) -> float:
     """Return the share of rows that do not meet a requirement; 0 if the variant has no such requirement."""
-    if not any(one.verdicts for one in rows):
+    if not any(row.verdicts for row in rows):
         return 1.0
     return 1.0 - met(rows, requirement).estimate if _judged(rows, requirement) else 0.0
 
 
-def _judged(rows: Sequence[Row], requirement: str) -> bool:
-    return any(requirement in one.verdicts for one in rows)
+def _judged(rows: Sequence[CampaignRow], requirement: str) -> bool:
+    return any(requirement in row.verdicts for row in rows)
 
 
 def _signs(objectives: Sequence[Objective]) -> Array:
-    return np.array([-1.0 if one.maximise else 1.0 for one in objectives])
+    return np.array([-1.0 if objective.maximise else 1.0 for objective in objectives])
 
 
 def _distributions(space: Space) -> dict[str, Any]:
@@ -445,7 +458,7 @@ def hardware_cost(model: str | ModelBuilder, currency: str) -> Objective:
             converted, and a sum without it would be too low.
     """
 
-    def price(row: Row) -> float:
+    def price(row: CampaignRow) -> float:
         sums = hardware_price(hardware(read_variant(model, row.point.values)))
         return sums[currency] if list(sums) == [currency] else nan
 

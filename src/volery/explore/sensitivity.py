@@ -19,9 +19,9 @@ from volery.base.errors import UsageError, did_you_mean
 from volery.base.installed import require_extra
 from volery.base.time import Ns, S
 from volery.explore.flight_phases import EVERYWHERE, Phases
-from volery.explore.points import Evaluate, Point, Row, Value
+from volery.explore.points import CampaignRow, Evaluate, Value, VariantPoint
 from volery.explore.search import Discard, Objective, search
-from volery.explore.space import Choices, Range, Space
+from volery.explore.space import Choices, RangeParameter, Space
 from volery.explore.specification import run_seed
 from volery.explore.statistics import LEVEL, Array, Interval
 from volery.model.faults import (
@@ -120,14 +120,14 @@ def sensitivity(
     problem = {"num_vars": len(space), "names": list(space), "bounds": [[0.0, 1.0]] * len(space)}
     shares = _plan(method, problem, size, run_seed(seed, 0))
     points = [
-        Point(
+        VariantPoint(
             {path: one.at(float(share)) for (path, one), share in zip(space.items(), row, strict=True)}, seed
         )
         for row in shares
     ]
     rows = evaluate(points)
-    values = np.array([measured.value(one) for one in rows], dtype=float)
-    names = dict.fromkeys(name for one in rows if one.completed for name in one.observables)
+    values = np.array([measured.value(row) for row in rows], dtype=float)
+    names = dict.fromkeys(name for row in rows if row.completed for name in row.observables)
     if names and measured.measure is None and measured.name not in names:
         raise UsageError(f"no run observed {measured.name!r}{did_you_mean(measured.name, list(names))}")
     group = len(space) + (1 if method == MORRIS else 2)
@@ -224,7 +224,7 @@ class Margin:
 def margin(  # noqa: PLR0913  # each is an option
     evaluate: Evaluate,
     path: str,
-    parameter: Range,
+    parameter: RangeParameter,
     requirement: str,
     *,
     worse: str = "greater",
@@ -273,7 +273,7 @@ def margin(  # noqa: PLR0913  # each is an option
         return parameter.at(share if worse == "greater" else 1.0 - share)
 
     def decide(share: float) -> bool | None:
-        return test(lambda run: Point({path: value(share)}, run_seed(seed, run)))
+        return test(lambda run: VariantPoint({path: value(share)}, run_seed(seed, run)))
 
     begin, end = decide(0.0), decide(1.0)
     holds, fails, doubts = 0.0 if begin else None, 1.0 if end is False else None, list[float]()
@@ -311,7 +311,7 @@ def _bisect(
             holds = middle
         else:
             fails = middle
-        doubts = [one for one in doubts if holds < one < fails]
+        doubts = [doubt for doubt in doubts if holds < doubt < fails]
 
 
 class _Test:
@@ -327,18 +327,18 @@ class _Test:
         self._looks = sorted(set(looks))
         self._error = error / len(self._looks)
 
-    def __call__(self, point: Callable[[int], Point]) -> bool | None:
+    def __call__(self, point: Callable[[int], VariantPoint]) -> bool | None:
         """Return whether the requirement is met often enough; None if it cannot be decided."""
         from scipy.stats import binomtest  # noqa: PLC0415  # optional
 
         met = done = 0
         for look in self._looks:
             rows = self._evaluate([point(run) for run in range(done, look)])
-            if not any(self._requirement in one.verdicts for one in rows if one.completed) and any(
-                one.completed for one in rows
+            if not any(self._requirement in row.verdicts for row in rows if row.completed) and any(
+                row.completed for row in rows
             ):
                 raise UsageError(f"no run judges a requirement {self._requirement!r}")
-            met += sum(one.completed and bool(one.verdicts.get(self._requirement)) for one in rows)
+            met += sum(row.completed and bool(row.verdicts.get(self._requirement)) for row in rows)
             self.runs += len(rows)
             done = look
             bounds = binomtest(met, done).proportion_ci(1.0 - 2.0 * self._error, "exact")
@@ -357,9 +357,9 @@ class WorstCase:
     """The worst that a search has found: runs that failed, and the completed run with the worst value."""
 
     quantity: str
-    worst: Row | None
+    worst: CampaignRow | None
     value: float
-    failed: tuple[Row, ...]
+    failed: tuple[CampaignRow, ...]
     runs: int
 
 
@@ -390,9 +390,9 @@ def worst_case(
     Raises:
         UsageError: As of ``search``.
     """
-    seen: list[Row] = []
+    seen: list[CampaignRow] = []
 
-    def remember(points: Sequence[Point]) -> list[Row]:
+    def remember(points: Sequence[VariantPoint]) -> list[CampaignRow]:
         rows = evaluate(points)
         seen.extend(rows)
         return rows
@@ -421,12 +421,12 @@ class FaultTrial:
     kind: str
     subject: str
     phase: str
-    rows: tuple[Row, ...]
+    rows: tuple[CampaignRow, ...]
 
     @property
     def met(self) -> int:
         """Runs that completed and met all requirements."""
-        return sum(one.ok for one in self.rows)
+        return sum(row.ok for row in self.rows)
 
 
 @dataclass(frozen=True)
@@ -440,8 +440,8 @@ class FaultCampaign:
     def table(self) -> dict[tuple[str, str], dict[str, str]]:
         """Return the coverage: by kind and subject, then by phase, ``met/runs``."""
         found: dict[tuple[str, str], dict[str, str]] = {}
-        for one in self.trials:
-            found.setdefault((one.kind, one.subject), {})[one.phase] = f"{one.met}/{len(one.rows)}"
+        for trial in self.trials:
+            found.setdefault((trial.kind, trial.subject), {})[trial.phase] = f"{trial.met}/{len(trial.rows)}"
         return found
 
 
@@ -478,7 +478,7 @@ def fault_campaign(
     if not phases or repetitions < 1:
         raise UsageError("a fault campaign needs a phase and a repetition")
     stated = {} if duration_ns is None else {"duration": _seconds(duration_ns)}
-    trials: list[tuple[str, str, str, list[Point]]] = []
+    trials: list[tuple[str, str, str, list[VariantPoint]]] = []
     without: list[str] = []
     for kind, made in FAULTS.items():
         subjects = list(_subjects(made, system))
@@ -492,11 +492,11 @@ def fault_campaign(
                     continue
                 fault = {"kind": kind, "at": _seconds(at), **stated, **about, **_severe(kind)}
                 points = [
-                    Point({**(values or {}), FAULT_PATH: fault}, run_seed(seed, run))
+                    VariantPoint({**(values or {}), FAULT_PATH: fault}, run_seed(seed, run))
                     for run in range(repetitions)
                 ]
                 trials.append((kind, subject, phase, points))
-    rows = iter(evaluate([one for *_, points in trials for one in points]))
+    rows = iter(evaluate([point for *_, points in trials for point in points]))
     return FaultCampaign(
         tuple(
             FaultTrial(kind, subject, phase, tuple(next(rows) for _ in points))
@@ -513,7 +513,9 @@ def _time_of(times: Mapping[str, Ns], key: str, subject: str, system: System) ->
         return times[EVERYWHERE]
     vehicle = subject if key == "vehicle" else None
     if key == "processor":
-        vehicle = next((one.carried_by for one in system.processors if one.name == subject), None)
+        vehicle = next(
+            (processor.carried_by for processor in system.processors if processor.name == subject), None
+        )
     return next(iter(times.values())) if vehicle is None else times.get(vehicle)
 
 
@@ -532,13 +534,13 @@ def _subjects(made: type[Fault], system: System) -> Iterator[tuple[str, str, dic
         return
     key, names = "", ["all"]
     if issubclass(made, VehicleFault):
-        rotors = any("motor" in one.name or "cells" in one.name for one in fields(made))
+        rotors = any("motor" in field.name or "cells" in field.name for field in fields(made))
         key = "vehicle"
-        names = [one.name for one in system.vehicles if not rotors or one.kind == "multirotor"]
+        names = [vehicle.name for vehicle in system.vehicles if not rotors or vehicle.kind == "multirotor"]
     elif issubclass(made, ProcessorFault):
-        key, names = "processor", [one.name for one in system.processors]
+        key, names = "processor", [processor.name for processor in system.processors]
     elif issubclass(made, NetworkFault):
-        key, names = "network", [one.name for one in system.networks]
+        key, names = "network", [network.name for network in system.networks]
     for name in names:
         yield key, name, {key: name} if key else {}
 

@@ -53,7 +53,7 @@ class Choices:
             return
         if len(self.weights) != len(self.values):
             raise UsageError(f"{len(self.values)} values have {len(self.weights)} weights; give one for each")
-        if not all(0.0 <= one < inf for one in self.weights) or not any(self.weights):
+        if not all(0.0 <= weight < inf for weight in self.weights) or not any(self.weights):
             raise UsageError("weights are numbers from 0 on, and one at least is more than 0")
 
     def at(self, share: float) -> Value:
@@ -70,7 +70,7 @@ class Choices:
 
 
 @dataclass(frozen=True)
-class Range:
+class RangeParameter:
     """A parameter with all numbers between two.
 
     Attributes:
@@ -120,7 +120,7 @@ class Range:
         return self.low + share * (self.high - self.low)
 
 
-class Law(NamedTuple):
+class DistributionKind(NamedTuple):
     """A kind of distribution.
 
     Attributes:
@@ -181,22 +181,24 @@ _TAIL = 1e-9
 
 _UNBOUNDED = {"least": -inf, "most": inf}
 LAWS: Final = {
-    "normal": Law(
+    "normal": DistributionKind(
         ("mean", "sd"),
         _UNBOUNDED,
         (),
         ("sd",),
         lambda share, of: _normal(share, of["mean"], of["sd"], of["least"], of["most"]),
     ),
-    "lognormal": Law(("median", "sigma"), _UNBOUNDED, ("sigma",), ("median", "sigma"), _lognormal),
-    "triangular": Law(("least", "mode", "most"), {}, (), (), _triangular),
-    "beta": Law(("a", "b", "least", "most"), {}, ("a", "b"), ("a", "b"), _beta),
+    "lognormal": DistributionKind(
+        ("median", "sigma"), _UNBOUNDED, ("sigma",), ("median", "sigma"), _lognormal
+    ),
+    "triangular": DistributionKind(("least", "mode", "most"), {}, (), (), _triangular),
+    "beta": DistributionKind(("a", "b", "least", "most"), {}, ("a", "b"), ("a", "b"), _beta),
 }
 """Distributions by their names."""
 
 
 @dataclass(frozen=True)
-class Distribution:
+class DistributedParameter:
     """A parameter with a distribution.
 
     Example::
@@ -256,7 +258,7 @@ class Distribution:
         raise UsageError(f"a distribution has no grid; choose another plan: {choices(METHODS[1:])}")
 
 
-Parameter = Choices | Range | Distribution
+Parameter = Choices | RangeParameter | DistributedParameter
 
 Space = Mapping[str, Parameter]
 """Parameters by the paths that they set, joined by commas if they are several, or by ``scenario`` and
@@ -264,7 +266,7 @@ Space = Mapping[str, Parameter]
 
 
 @dataclass(frozen=True)
-class Plan:
+class SamplingPlan:
     """How a space is sampled.
 
     Attributes:
@@ -319,4 +321,4 @@ class Plan:
 
 def default_space(system: System) -> Space:
     """Return the space of the model's own design parameters."""
-    return {PATHS.join(one.paths): Choices(one.values) for one in system.design_parameters}
+    return {PATHS.join(parameter.paths): Choices(parameter.values) for parameter in system.design_parameters}

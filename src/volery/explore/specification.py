@@ -18,8 +18,17 @@ from volery.base.errors import Location, ModelError, UsageError, choices, did_yo
 from volery.base.files import read_text
 from volery.base.time import Ns, S
 from volery.base.units import QuantityError
-from volery.explore.points import Point
-from volery.explore.space import GRID, LAWS, METHODS, Choices, Distribution, Parameter, Plan, Range
+from volery.explore.points import VariantPoint
+from volery.explore.space import (
+    GRID,
+    LAWS,
+    METHODS,
+    Choices,
+    DistributedParameter,
+    Parameter,
+    RangeParameter,
+    SamplingPlan,
+)
 from volery.model.assembly import change_from_option, model_file, read_tree
 from volery.model.builder import ModelBuilder, plain_node
 from volery.model.fields import (
@@ -34,8 +43,8 @@ from volery.model.fields import (
     WrongValueError,
     read_child,
 )
-from volery.model.reading import Reading, Vocabulary
-from volery.model.text import Node, Path, Problems, parse, parse_value
+from volery.model.reading import ModelReading, Vocabulary
+from volery.model.text import Path, Problems, TextNode, parse, parse_value
 
 SECTION: Path = ("explore",)
 EXPLORE_FILE = "explore.yaml"
@@ -47,7 +56,7 @@ FIDELITIES = ("times", "code")
 class _Parameter(Syntax):
     """A list of values, a range ``a .. b`` or ``{from, to}``, a distribution, or a single value."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Parameter:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Parameter:
         """See ``Syntax``."""
         try:
             return read_parameter(node)
@@ -73,7 +82,7 @@ class _WrongPartError(UsageError):
         self.path = path
 
 
-def read_parameter(node: Node) -> Parameter:
+def read_parameter(node: TextNode) -> Parameter:
     """Return the parameter that is written at *node*. Raises ``UsageError``."""
     if isinstance(node.value, list):
         if not node.value:
@@ -90,7 +99,7 @@ def read_parameter(node: Node) -> Parameter:
 _RANGE_KEYS = ("from", "to", "steps", "log", "integer")
 
 
-def _written_parameter(node: Node) -> Parameter:
+def _written_parameter(node: TextNode) -> Parameter:
     stated: dict[str, Any] = {key: one.value for key, one in node.items.items()}
     if len(stated) == 1 and "from" not in stated and "to" not in stated:
         ((kind, inner),) = node.items.items()
@@ -116,7 +125,7 @@ def _written_parameter(node: Node) -> Parameter:
     )
 
 
-def _distribution(name: str, node: Node) -> Distribution:
+def _distribution(name: str, node: TextNode) -> DistributedParameter:
     law = LAWS.get(name)
     if law is None:
         names = (*LAWS, "discrete")
@@ -134,7 +143,7 @@ def _distribution(name: str, node: Node) -> Distribution:
                 raise _WrongPartError(
                     (name, key), f"`{key}` of a {name} distribution has no unit, not {found!r}"
                 )
-        return Distribution(name, numbers | {key: number for key, (number, _) in bare.items()}, unit)
+        return DistributedParameter(name, numbers | {key: number for key, (number, _) in bare.items()}, unit)
     except _WrongPartError:
         raise
     except UsageError as error:
@@ -142,7 +151,7 @@ def _distribution(name: str, node: Node) -> Distribution:
         raise _WrongPartError((name, *named[:1]), str(error)) from None
 
 
-def _discrete(node: Node) -> Choices:
+def _discrete(node: TextNode) -> Choices:
     lists = {key: one.value for key, one in node.items.items()}
     wrong = [key for key in lists if key not in ("values", "weights")]
     if wrong or not all(isinstance(lists.get(key), list) and lists[key] for key in ("values", "weights")):
@@ -186,13 +195,15 @@ def _number(value: Any) -> tuple[float, str]:
     return number, text[len(digits) :].strip()
 
 
-def _range(low: Any, high: Any, *, steps: int = 0, log: bool = False, integer: bool = False) -> Range:
+def _range(
+    low: Any, high: Any, *, steps: int = 0, log: bool = False, integer: bool = False
+) -> RangeParameter:
     numbers, unit = _numbers({"from": low, "to": high})
     if not numbers["from"] < numbers["to"]:
         raise UsageError(f"a range goes up: {low} is not less than {high}")
     if log and numbers["from"] <= 0.0:
         raise UsageError(f"a logarithmic range begins above 0, not at {low}")
-    return Range(numbers["from"], numbers["to"], unit, log, integer, steps)
+    return RangeParameter(numbers["from"], numbers["to"], unit, log, integer, steps)
 
 
 def parameter_text(parameter: Parameter) -> Any:
@@ -204,7 +215,7 @@ def parameter_text(parameter: Parameter) -> Any:
             if parameter.weights
             else values
         )
-    if isinstance(parameter, Distribution):
+    if isinstance(parameter, DistributedParameter):
         bare = LAWS[parameter.law].bare
         return {
             parameter.law: {
@@ -213,7 +224,7 @@ def parameter_text(parameter: Parameter) -> Any:
                 if np.isfinite(number)
             }
         }
-    ends = Range(parameter.low, parameter.high, parameter.unit)
+    ends = RangeParameter(parameter.low, parameter.high, parameter.unit)
     flags = {"steps": parameter.steps, "log": parameter.log, "integer": parameter.integer}
     return {"from": ends.value(ends.low), "to": ends.value(ends.high)} | {
         key: flag for key, flag in flags.items() if flag
@@ -249,12 +260,12 @@ class Specification:
     limit_ns: Annotated[Ns, PERIOD, "Wall time that a run may take."] = 3600 * S
     memory_b: Annotated[float | None, DATA_SIZE, "Resident memory that the process of a run may use."] = None
 
-    def run_points(self) -> Iterator[Point]:
+    def run_points(self) -> Iterator[VariantPoint]:
         """Yield the point of each run: all seeds of a variant, then the next variant."""
         run = 0
-        for values in Plan(self.plan, self.points).variants(self.space, self.seed):
+        for values in SamplingPlan(self.plan, self.points).variants(self.space, self.seed):
             for repetition in range(self.seeds):
-                yield Point(values, run_seed(self.seed, repetition if self.common else run))
+                yield VariantPoint(values, run_seed(self.seed, repetition if self.common else run))
                 run += 1
 
     def plain(self) -> dict[str, Any]:
@@ -295,7 +306,7 @@ def specification_of(model: str | FilePath | ModelBuilder, file: FilePath | None
     Raises:
         ModelError: What is wrong, with file and line; all of it at once.
     """
-    node: Node | None = None
+    node: TextNode | None = None
     if isinstance(model, ModelBuilder):
         node = model.root.at(SECTION)
     else:
@@ -307,7 +318,7 @@ def specification_of(model: str | FilePath | ModelBuilder, file: FilePath | None
     return Specification() if node is None else read_specification(node)
 
 
-def _from_file(file: FilePath) -> Node:
+def _from_file(file: FilePath) -> TextNode:
     try:
         root = parse(read_text(file), str(file))
     except (OSError, UnicodeDecodeError) as error:
@@ -318,13 +329,13 @@ def _from_file(file: FilePath) -> Node:
     return node
 
 
-def read_specification(node: Node | Mapping[str, Any]) -> Specification:
+def read_specification(node: TextNode | Mapping[str, Any]) -> Specification:
     """Return the specification that is written at *node*, or in plain data. Raises ``ModelError``."""
-    if not isinstance(node, Node):
+    if not isinstance(node, TextNode):
         node = plain_node(node, Location("explore", 0))
-    root = Node({"explore": node}, node.where)
+    root = TextNode({"explore": node}, node.where)
     problems = Problems(root.locate)
-    reading = Reading(root, problems, _NO_NAMES, FilePath(), root)
+    reading = ModelReading(root, problems, _NO_NAMES, FilePath(), root)
     _, made = read_child(_SPECIFICATION, node, SECTION, reading)
     if made is not None:
         for path in made.space:
@@ -347,7 +358,7 @@ def parameter_from_option(text: str) -> tuple[str, Parameter]:
     node = change.value
     try:
         if isinstance(node.value, str) and not node.quoted and "," in node.value:
-            node = Node([parse_value(one, where) for one in node.value.split(",")], where)
+            node = TextNode([parse_value(word, where) for word in node.value.split(",")], where)
         return path.strip(), read_parameter(node)
     except UsageError as error:
         raise UsageError(f"--set {text}: {error}") from None

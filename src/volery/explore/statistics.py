@@ -30,7 +30,7 @@ import numpy.typing as npt
 
 from volery.base import units
 from volery.base.errors import UsageError
-from volery.explore.points import Row
+from volery.explore.points import CampaignRow
 
 Array = npt.NDArray[np.float64]
 
@@ -294,12 +294,12 @@ def _known(values: Sequence[float] | Array) -> Array:
 # -- of rows
 
 
-def observed(rows: Iterable[Row], name: str) -> Array:
+def observed(rows: Iterable[CampaignRow], name: str) -> Array:
     """Return an observable of rows; NaN where the run did not complete or did not observe it."""
-    return np.array([one.observables.get(name, nan) if one.completed else nan for one in rows], dtype=float)
+    return np.array([row.observables.get(name, nan) if row.completed else nan for row in rows], dtype=float)
 
 
-def met(rows: Iterable[Row], requirement: str, level: float = LEVEL) -> Interval:
+def met(rows: Iterable[CampaignRow], requirement: str, level: float = LEVEL) -> Interval:
     """Return the probability that a requirement is met. A run that did not complete does not meet it.
 
     Raises:
@@ -340,7 +340,7 @@ class Until:
     relative: bool
     level: float = LEVEL
 
-    def interval(self, rows: Iterable[Row]) -> Interval:
+    def interval(self, rows: Iterable[CampaignRow]) -> Interval:
         """Return the interval after these rows."""
         if self.statistic == "probability":
             return met(rows, self.name, self.level)
@@ -491,7 +491,9 @@ def paired(first: Mapping[int, float], second: Mapping[int, float], level: float
     return Paired(difference, correlation, saved, len(seeds) - len(pairs))
 
 
-def compared(first: Iterable[Row], second: Iterable[Row], name: str, level: float = LEVEL) -> Paired:
+def compared(
+    first: Iterable[CampaignRow], second: Iterable[CampaignRow], name: str, level: float = LEVEL
+) -> Paired:
     """Compare an observable of the rows of two variants, paired by seed. See ``paired``."""
     values = [
         dict(zip((row.point.seed for row in rows), observed(rows, name), strict=True))

@@ -82,8 +82,8 @@ def is_compiling(frame: FrameType | None) -> bool:
 
 def component_line(frame: FrameType | None) -> str:
     """Return ``file:line`` of the innermost line of component code, else of the framework."""
-    found = next((each for each in _callers(frame) if not _is_framework(each)), frame)
-    return f"{found.f_code.co_filename}:{found.f_lineno}" if found is not None else "an unknown line"
+    caller = next((each for each in _callers(frame) if not _is_framework(each)), frame)
+    return f"{caller.f_code.co_filename}:{caller.f_lineno}" if caller is not None else "an unknown line"
 
 
 class StallReport(NamedTuple):

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
 from volery.kernel.task import NO_DEADLINE, ExecutionContext, Task
-from volery.kernel.virtual import FOREVER, NEVER, Timer, VirtualKernel
+from volery.kernel.virtual import FOREVER, NEVER, ResettableTimer, VirtualKernel
 from volery.trace.events import Preemption, Slice, ignore
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Core:
 
     __slots__ = ("job", "last", "number", "timer")
 
-    def __init__(self, number: int, timer: Timer) -> None:
+    def __init__(self, number: int, timer: ResettableTimer) -> None:
         self.number, self.timer = number, timer
         self.job: Job | None = None
         self.last: Task | ExecutionContext | None = None
@@ -158,7 +158,7 @@ class Processor:
         self._halted = False
 
     def _core(self, number: int) -> Core:
-        core = Core(number, Timer(_nothing))
+        core = Core(number, ResettableTimer(_nothing))
         core.timer.action = partial(self._expire, core)
         return core
 

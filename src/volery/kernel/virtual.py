@@ -104,7 +104,7 @@ class Entry:
         self.event = VOID
 
 
-class Timer(Entry):
+class ResettableTimer(Entry):
     """A framework callback that its owner sets and cancels again and again, of which one time is in force.
 
     It executes in the task that blocks, if there is one, which saves two switches.
@@ -177,7 +177,7 @@ class VirtualKernel:
         self._schedule(entry, when)
         return entry
 
-    def set_timer(self, timer: Timer, when: Ns) -> None:
+    def set_timer(self, timer: ResettableTimer, when: Ns) -> None:
         """Let a timer execute at `when`, ns, or now if that is past, and at no other time."""
         self._schedule(timer, when)
 
@@ -358,7 +358,7 @@ class VirtualKernel:
                 if target is not task:  # else a timer has woken the task that is about to wait
                     target.flow.switch()
                 return
-            elif isinstance(target, Timer):
+            elif isinstance(target, ResettableTimer):
                 del targets[heappop(heap)]
                 self._now = due >> TICKET_BITS
                 self._current = None
@@ -367,7 +367,7 @@ class VirtualKernel:
                 break
         self._switch_to_hub()
 
-    def _execute(self, timer: Timer) -> None:
+    def _execute(self, timer: ResettableTimer) -> None:
         """Execute a timer in the task that blocks. What it raises, or a cancelled run, is left to the hub."""
         try:
             timer.action()

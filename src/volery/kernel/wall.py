@@ -34,7 +34,7 @@ FOREVER: Ns = 2**63 - 1
 GRACE_S = 2.0
 
 
-class Entry:
+class WallEntry:
     """A framework callback in the heap."""
 
     __slots__ = ("action",)
@@ -48,7 +48,7 @@ class Entry:
 
 
 @dataclass(eq=False, slots=True)
-class Flow:
+class TaskThread:
     """The thread of a task."""
 
     woken: threading.Condition
@@ -68,7 +68,7 @@ class WallKernel:
         self._speed = speed
         self._began: int | None = None
         self._gone = threading.Condition(self._monitor)  # a task has ended or will never end
-        self._heap: list[tuple[Ns, int, Entry]] = []
+        self._heap: list[tuple[Ns, int, WallEntry]] = []
         self._tickets = count(1)
         self._inbox: deque[Action] = deque()
         self._wake_up = AutoResetEvent()  # wakes the hub
@@ -92,9 +92,9 @@ class WallKernel:
         task: Task | None = getattr(self._local, "task", None)
         return task
 
-    def call_at(self, when: Ns, action: Action) -> Entry:
+    def call_at(self, when: Ns, action: Action) -> WallEntry:
         """Execute a framework callback at `when`, ns, or as soon as possible if that is past."""
-        entry = Entry(action)
+        entry = WallEntry(action)
         with self._monitor:
             heappush(self._heap, (when, next(self._tickets), entry))
             if self._heap[0][2] is entry:
@@ -117,7 +117,7 @@ class WallKernel:
             thread = threading.Thread(
                 target=self._live, args=(task, body, self.now()), name=name, daemon=True
             )
-            task.flow = Flow(threading.Condition(self._monitor), thread)
+            task.flow = TaskThread(threading.Condition(self._monitor), thread)
             if self._began is not None:
                 thread.start()
         return task
@@ -328,7 +328,7 @@ class WallKernel:
             raise UsageError(f"adopt({name!r}): this flow is the task {current.name!r} already")
         task = Task(name, ExecutionContext(name), self.root)
         task.adopted = True
-        task.flow = Flow(threading.Condition(self._monitor))
+        task.flow = TaskThread(threading.Condition(self._monitor))
         self.start()
         self._local.task = self._adopted = task
         try:
@@ -355,7 +355,7 @@ class WallKernel:
         name = threading.current_thread().name
         with self._monitor:
             task = Task(name, ExecutionContext(name), self.root)
-            task.flow = Flow(threading.Condition(self._monitor))
+            task.flow = TaskThread(threading.Condition(self._monitor))
         self._local.task = task
         try:
             yield

@@ -17,7 +17,7 @@ from typing import Protocol
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
-from volery.links.link import Codec, Receiver, ReceiveStatistics
+from volery.links.link import Receiver, ReceiveStatistics, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 from volery.trace.events import LinkState
 
@@ -40,7 +40,7 @@ CONNECTION_FAULTS = (OSError, ValueError, OverflowError)
 class CodedLink(ABC):
     """A link that encodes frames to bytes. A subclass moves the bytes and calls ``arrived``."""
 
-    def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
+    def __init__(self, kernel: Kernel, name: str, codec: WireFormat = MAVLINK) -> None:
         self.name = name
         self._kernel = kernel
         self._codec = codec
@@ -176,7 +176,7 @@ class StreamLink(CodedLink):
     and then at intervals that double up to ``LONGEST_RETRY``.
     """
 
-    def __init__(self, kernel: Kernel, name: str, codec: Codec = MAVLINK) -> None:
+    def __init__(self, kernel: Kernel, name: str, codec: WireFormat = MAVLINK) -> None:
         super().__init__(kernel, name, codec)
         self._stream: ByteStream | None = None
         self._unsent = bytearray()

@@ -25,7 +25,7 @@ from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.links.frame import Frame
 from volery.links.mavlink_messages import StatusTextAssembler, constant
-from volery.links.tlog import LINK_BITS, Entry, has_links, read_tlog
+from volery.links.tlog import LINK_BITS, LoggedFrame, has_links, read_tlog
 
 Table = Mapping[str, NDArray[np.float64]]
 Tables = dict[str, Table]
@@ -169,7 +169,7 @@ class _Senders:
     MAVProxy on which fewer messages of the first autopilot came.
     """
 
-    def __init__(self, entries: Sequence[Entry]) -> None:
+    def __init__(self, entries: Sequence[LoggedFrame]) -> None:
         self._autopilots: dict[int, int] = {}  # component of each system's, in the order of the log
         for _, frame, _ in entries:
             if frame.name == "HEARTBEAT" and frame.fields["autopilot"] != _NO_AUTOPILOT:

@@ -1,8 +1,8 @@
 """Links between parts of one process: a link without a wire, and shares of one link.
 
 On a link without a wire frames travel as values, not as bytes, and arrive after a delay. The values are
-quantised as on a wire (``Codec.quantised``): 32-bit floats, strings cut to length, all fields present, and a
-field that does not fit is refused. This costs a few microseconds per frame and keeps a simulation from
+quantised as on a wire (``WireFormat.quantised``): 32-bit floats, strings cut to length, all fields present,
+and a field that does not fit is refused. This costs a few microseconds per frame and keeps a simulation from
 depending on digits that no radio carries. Frames of one end that arrive at one instant are one event of the
 kernel.
 
@@ -17,14 +17,14 @@ from functools import partial
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
-from volery.links.link import Codec, Link, Receiver
+from volery.links.link import Link, Receiver, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 
 
 class InProcessLink:
     """One end. Frames keep their order; frames sent before the other end receives are lost, as on a wire."""
 
-    def __init__(self, kernel: Kernel, name: str, delay: Ns, codec: Codec = MAVLINK) -> None:
+    def __init__(self, kernel: Kernel, name: str, delay: Ns, codec: WireFormat = MAVLINK) -> None:
         self.name = name
         self._kernel = kernel
         self._delay = delay
@@ -79,7 +79,7 @@ class InProcessLink:
 
 
 def in_process_pair(
-    kernel: Kernel, delay: Ns = MS, name: str = "link", codec: Codec = MAVLINK
+    kernel: Kernel, delay: Ns = MS, name: str = "link", codec: WireFormat = MAVLINK
 ) -> tuple[InProcessLink, InProcessLink]:
     """Return the vehicle's end and the autopilot's end of a link called *name*."""
     ours = InProcessLink(kernel, name, delay, codec)

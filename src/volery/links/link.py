@@ -110,7 +110,7 @@ class FrameParser(Protocol):
         """Return what is wrong with the received bytes; ``""`` if nothing is, or if nothing was received."""
 
 
-class Codec(Protocol):
+class WireFormat(Protocol):
     """Wire format of one protocol."""
 
     @property

@@ -26,8 +26,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
 from volery.links.frame import Frame
-from volery.links.link import Codec, NonFrameBytes, ReceiveStatistics
-from volery.links.mavlink_messages import MessageType, message_type, message_type_of
+from volery.links.link import NonFrameBytes, ReceiveStatistics, WireFormat
+from volery.links.mavlink_messages import MavlinkMessageType, message_type, message_type_of
 
 STX = 0xFD
 STX_V1 = 0xFE
@@ -90,7 +90,7 @@ class _Header:
             number = low | high << 16
             self.payload = start + HEADER.size
             self.trailer += SIGNATURE_LENGTH if incompatible & SIGNED else 0
-        self.kind: MessageType | None = message_type_of(number)
+        self.kind: MavlinkMessageType | None = message_type_of(number)
         self.length: int = self.payload - start + size + self.trailer
         if incompatible & ~SIGNED:
             self.length = 0
@@ -244,7 +244,7 @@ class _MavlinkCodec:
     quantised = staticmethod(quantised)
 
 
-MAVLINK: Codec = _MavlinkCodec()
+MAVLINK: WireFormat = _MavlinkCodec()
 
 
 KEY_LENGTH = 32

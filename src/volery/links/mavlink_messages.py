@@ -51,7 +51,7 @@ class FieldDefinition(NamedTuple):
 
 
 class MessageDefinition:
-    """A message definition with the attributes of pymavlink's that ``MessageType`` reads.
+    """A message definition with the attributes of pymavlink's that ``MavlinkMessageType`` reads.
 
     Field order on the wire and the extra byte of the checksum follow from names and types by MAVLink's rules
     (https://mavlink.io/en/guide/serialization.html): larger types first, otherwise in the order given; the
@@ -177,7 +177,7 @@ def _dict_maker(names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
     return made
 
 
-class MessageType:
+class MavlinkMessageType:
     """One message of the dialect: its id and the layout of its payload.
 
     ``size`` is the payload length in bytes before trailing zeros are cut off.
@@ -243,7 +243,7 @@ class MessageType:
         if (
             self._whole
             and len(fields) == len(self._names)
-            and all(type(one) is int for one in fields.values())
+            and all(type(field) is int for field in fields.values())
         ):
             return fields
         return self.unpack(payload)
@@ -296,12 +296,13 @@ class MessageType:
 
 
 _TYPES = {
-    definition.id: MessageType(definition) for definition in (*NEWER_MESSAGES, *dialect.mavlink_map.values())
+    definition.id: MavlinkMessageType(definition)
+    for definition in (*NEWER_MESSAGES, *dialect.mavlink_map.values())
 }
 _BY_NAME = {kind.name: kind for kind in _TYPES.values()}
 
 
-def message_type(name: str) -> MessageType:
+def message_type(name: str) -> MavlinkMessageType:
     """Return the message type called *name*; raise ``UsageError`` if the dialect has none."""
     kind = _BY_NAME.get(name)
     if kind is None:
@@ -309,7 +310,7 @@ def message_type(name: str) -> MessageType:
     return kind
 
 
-def message_type_of(number: int) -> MessageType | None:
+def message_type_of(number: int) -> MavlinkMessageType | None:
     """Return the message type with id *number*, or None if the dialect has none."""
     return _TYPES.get(number)
 

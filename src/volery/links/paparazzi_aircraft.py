@@ -39,7 +39,7 @@ FIRST_WAYPOINT = 1
 
 
 @dataclass(frozen=True)
-class Setting:
+class AircraftSetting:
     """A variable that can be set in flight. ``name`` is the short name, else the variable.
 
     ``header`` is the file of the aircraft's code that declares the variable, where the XML states one.
@@ -63,7 +63,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Waypoint:
+class PlanWaypoint:
     """A waypoint, in metres east and north of the plan's origin; NaN where the plan gives degrees."""
 
     number: int
@@ -90,13 +90,13 @@ class PaparazziAircraft:
     source: str
     name: str = ""
     system: int | None = None
-    settings: tuple[Setting, ...] = ()
+    settings: tuple[AircraftSetting, ...] = ()
     blocks: tuple[Block, ...] = ()
-    waypoints: tuple[Waypoint, ...] = ()
+    waypoints: tuple[PlanWaypoint, ...] = ()
     farthest: float | None = None
     fingerprint: tuple[int, ...] = ()
 
-    def setting(self, name: str) -> Setting:
+    def setting(self, name: str) -> AircraftSetting:
         """Return the setting that a ground station finds under *name*.
 
         The first of these that fits decides: the short name, the variable, the variable without its
@@ -135,7 +135,7 @@ class PaparazziAircraft:
                 return one
         raise self._lacks("block", name, [one.name for one in self.blocks])
 
-    def waypoint(self, name: str) -> Waypoint:
+    def waypoint(self, name: str) -> PlanWaypoint:
         """Return the waypoint called *name*; raise ``UsageError`` listing the waypoints otherwise."""
         for one in self.waypoints:
             if one.name == name:
@@ -249,14 +249,14 @@ def _with(aircraft: PaparazziAircraft, root: Any, file: str) -> PaparazziAircraf
     return aircraft
 
 
-def _settings(root: Any, file: str) -> Iterable[Setting]:
+def _settings(root: Any, file: str) -> Iterable[AircraftSetting]:
     for number, element in enumerate(root.iter("dl_setting")):
         given = {name.lower(): value for name, value in element.attrib.items()}
         variable = given.get("var", "")
         words = tuple(word for word in given.get("values", "").split("|") if word)
         low, high = (_float(given.get(name, "0"), name, element, file) for name in ("min", "max"))
         name, header = given.get("shortname") or variable, given.get("header", "")
-        yield Setting(number, name, variable, low, high, words, header)
+        yield AircraftSetting(number, name, variable, low, high, words, header)
 
 
 def _blocks(plan: Any, file: str) -> Iterable[Block]:
@@ -265,15 +265,15 @@ def _blocks(plan: Any, file: str) -> Iterable[Block]:
         yield Block(number, _name(element, file))
 
 
-def _waypoints(plan: Any, file: str) -> Iterable[Waypoint]:
+def _waypoints(plan: Any, file: str) -> Iterable[PlanWaypoint]:
     for number, element in enumerate(plan.iterfind("waypoints/waypoint"), FIRST_WAYPOINT):
         east, north = (
             _number(element, name, file) if name in element.attrib else float("nan") for name in ("x", "y")
         )
-        yield Waypoint(number, _name(element, file), east, north)
+        yield PlanWaypoint(number, _name(element, file), east, north)
 
 
-Named = TypeVar("Named", Setting, Block, Waypoint)
+Named = TypeVar("Named", AircraftSetting, Block, PlanWaypoint)
 
 
 def _unique(found: Iterable[Named], file: str) -> tuple[Named, ...]:

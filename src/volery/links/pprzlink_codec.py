@@ -19,7 +19,7 @@ from itertools import accumulate
 
 from volery.base.errors import UsageError
 from volery.links.frame import Frame
-from volery.links.link import Codec, NonFrameBytes, ReceiveStatistics
+from volery.links.link import NonFrameBytes, ReceiveStatistics, WireFormat
 from volery.links.mavlink_codec import MavlinkParser
 from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type, message_type_of
 
@@ -177,4 +177,4 @@ class _PprzlinkCodec:
     quantised = staticmethod(quantised)
 
 
-PPRZLINK: Codec = _PprzlinkCodec()
+PPRZLINK: WireFormat = _PprzlinkCodec()

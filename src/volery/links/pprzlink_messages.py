@@ -35,7 +35,7 @@ _CODES = {
 _ANY = -1
 
 
-class Field(NamedTuple):
+class PayloadField(NamedTuple):
     """One field. ``length`` is 0 for a single value, the array length, or -1 if a count comes first."""
 
     name: str
@@ -49,10 +49,10 @@ class Field(NamedTuple):
         return self.code == "s"
 
 
-class MessageType:
+class PprzMessageType:
     """One message: its number within its class, and its fields."""
 
-    def __init__(self, kind: int, number: int, name: str, fields: tuple[Field, ...]) -> None:
+    def __init__(self, kind: int, number: int, name: str, fields: tuple[PayloadField, ...]) -> None:
         self.kind, self.id, self.name = kind, number, name
         self.fields = fields
         self.field_names = tuple(field.name for field in fields)
@@ -105,7 +105,7 @@ class MessageType:
         raise UsageError(f"{self.name} has no field {field!r}{hint}")
 
 
-def _packed(field: Field, given: Any) -> bytes:
+def _packed(field: PayloadField, given: Any) -> bytes:
     if field.text:
         octets = str(given or "").encode(errors="replace")
         if field.length == _ANY:
@@ -122,7 +122,7 @@ def _packed(field: Field, given: Any) -> bytes:
     return struct.pack(f"<{field.length}{field.code}", *values)
 
 
-def _unpacked(field: Field, payload: bytes, at: int) -> tuple[Any, int] | None:
+def _unpacked(field: PayloadField, payload: bytes, at: int) -> tuple[Any, int] | None:
     """Return the value and the start of the next field, or None if the payload ends before."""
     count = field.length
     if count == _ANY:
@@ -142,21 +142,21 @@ def _unpacked(field: Field, payload: bytes, at: int) -> tuple[Any, int] | None:
 # -- the definitions
 
 
-def _field(text: str) -> Field:
+def _field(text: str) -> PayloadField:
     name, kind, *more = text.split()
     words = tuple(more[0][1:].split("|")) if more and more[0].startswith("=") else ()
     if kind == "string":
-        return Field(name, "s", _ANY, words)
+        return PayloadField(name, "s", _ANY, words)
     base, bracket, inside = kind.partition("[")
     length = int(inside[:-1] or _ANY) if bracket else 0
     if base == "char" and not bracket:
         length = 1
-    return Field(name, _CODES[base], length, words)
+    return PayloadField(name, _CODES[base], length, words)
 
 
-def parse_definitions(text: str) -> list[MessageType]:
+def parse_definitions(text: str) -> list[PprzMessageType]:
     """Return the messages defined by *text* in the format that ``pprzlink_messages.txt`` describes."""
-    found: list[MessageType] = []
+    found: list[PprzMessageType] = []
     kind = 0
     for line in text.splitlines():
         if line.startswith("==="):
@@ -165,7 +165,7 @@ def parse_definitions(text: str) -> list[MessageType]:
             head, _, listed = line.partition(":")
             number, name = head.split()
             fields = tuple(_field(part) for part in listed.split(",") if part.strip())
-            found.append(MessageType(kind, int(number), name, fields))
+            found.append(PprzMessageType(kind, int(number), name, fields))
     return found
 
 
@@ -175,7 +175,7 @@ _BY_NAME = {one.name: one for one in _ALL}
 assert len(_BY_NUMBER) == len(_BY_NAME) == len(_ALL), "a message is defined twice"
 
 
-def message_type(name: str) -> MessageType:
+def message_type(name: str) -> PprzMessageType:
     """Return the message type called *name*; raise ``UsageError`` if there is none."""
     found = _BY_NAME.get(name)
     if found is None:
@@ -183,7 +183,7 @@ def message_type(name: str) -> MessageType:
     return found
 
 
-def message_type_of(kind: int, number: int) -> MessageType | None:
+def message_type_of(kind: int, number: int) -> PprzMessageType | None:
     """Return the message type *number* of class *kind*, or None if there is none."""
     return _BY_NUMBER.get((kind, number))
 

@@ -19,7 +19,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CONNECTION_FAULTS, MAX_UNSENT, ROOM, ByteStream, CodedLink, StreamLink
-from volery.links.link import Codec, FrameParser
+from volery.links.link import FrameParser, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 
 MAX_CLIENTS = 64
@@ -67,7 +67,9 @@ class _SocketStream:
 class TcpClient(StreamLink):
     """Connects to ``host:port``, and again whenever the connection breaks."""
 
-    def __init__(self, kernel: Kernel, host: str, port: int, name: str = "", codec: Codec = MAVLINK) -> None:
+    def __init__(
+        self, kernel: Kernel, host: str, port: int, name: str = "", codec: WireFormat = MAVLINK
+    ) -> None:
         self._host, self._port = host, port
         super().__init__(kernel, name or f"tcp://{host}:{port}", codec)
 
@@ -226,7 +228,7 @@ class TcpServer(CodedLink):
         name: str = "",
         *,
         on_connect: Callable[[], None] | None = None,
-        codec: Codec = MAVLINK,
+        codec: WireFormat = MAVLINK,
     ) -> None:
         try:
             self._listener = socket.create_server((host, port))
@@ -376,7 +378,7 @@ class SerialLink(StreamLink):
     """Opens *device* at *baud*, and again whenever the device returns (a replugged adapter)."""
 
     def __init__(
-        self, kernel: Kernel, device: str, baud: int, name: str = "", codec: Codec = MAVLINK
+        self, kernel: Kernel, device: str, baud: int, name: str = "", codec: WireFormat = MAVLINK
     ) -> None:
         self._device, self._baud = device, baud
         super().__init__(kernel, name or f"serial://{device}", codec)

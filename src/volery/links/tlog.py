@@ -90,7 +90,7 @@ class TlogTap:
             self._file.flush()
 
 
-class Entry(NamedTuple):
+class LoggedFrame(NamedTuple):
     """One frame of a log: its stamp in microseconds, and its sequence number."""
 
     at_us: int
@@ -98,21 +98,21 @@ class Entry(NamedTuple):
     sequence: int
 
 
-def read_tlog(path: Path) -> Iterator[Entry]:
+def read_tlog(path: Path) -> Iterator[LoggedFrame]:
     """Yield the frames of known messages of a log in order. Damaged parts and a cut end are skipped."""
     data = path.read_bytes()
     after = 0
-    while (found := _FRAME_START.search(data, after + _STAMP.size)) is not None:
-        start = found.start()
+    while (match := _FRAME_START.search(data, after + _STAMP.size)) is not None:
+        start = match.start()
         length = frame_length(data, start)
         after = start + length if length else start + 1 - _STAMP.size
         frames = MavlinkParser().feed(data[start:after])
         if frames:
             sequence = data[start + (4 if data[start] == STX else 2)]
-            yield Entry(_STAMP.unpack_from(data, start - _STAMP.size)[0], frames[0], sequence)
+            yield LoggedFrame(_STAMP.unpack_from(data, start - _STAMP.size)[0], frames[0], sequence)
 
 
-def has_links(entries: Iterable[Entry]) -> bool:
+def has_links(entries: Iterable[LoggedFrame]) -> bool:
     """Return whether the two lowest bits of the stamps are numbers of links, as in MAVProxy's logs.
 
     A sender numbers its frames one by one on each link. If they follow each other within the frames of equal

@@ -12,7 +12,7 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CONNECTION_FAULTS, CodedLink, ReaderThread
-from volery.links.link import Codec, FrameParser
+from volery.links.link import FrameParser, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 
 PEER_TIMEOUT: Ns = 10 * S
@@ -52,7 +52,7 @@ class UdpLink(CodedLink):
         peer: Endpoint | None = None,
         name: str = "",
         *,
-        codec: Codec = MAVLINK,
+        codec: WireFormat = MAVLINK,
         answers_to: int | None = None,
     ) -> None:
         self._answers_to = answers_to
@@ -145,7 +145,7 @@ class UdpServer(UdpLink):
     """
 
     def __init__(
-        self, kernel: Kernel, host: str, port: int, name: str = "", *, codec: Codec = MAVLINK
+        self, kernel: Kernel, host: str, port: int, name: str = "", *, codec: WireFormat = MAVLINK
     ) -> None:
         self._peers: dict[Endpoint, _Peer] = {}
         self._sources: dict[tuple[int, int], Endpoint] = {}  # of the frames of a system and component

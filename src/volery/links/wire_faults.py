@@ -15,7 +15,7 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CodedLink
-from volery.links.link import Codec
+from volery.links.link import WireFormat
 from volery.links.mavlink_codec import MAVLINK
 
 BURST_LENGTH = 40
@@ -119,7 +119,7 @@ class FaultyLink(CodedLink):
     """One end of a link within one process that carries bytes, with faults."""
 
     def __init__(
-        self, kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns, codec: Codec
+        self, kernel: Kernel, name: str, faults: WireFaults, random: Random, *, delay: Ns, codec: WireFormat
     ) -> None:
         super().__init__(kernel, name, codec)
         self.peer: FaultyLink = self
@@ -189,7 +189,7 @@ def faulty_pair(
     random: Random,
     *,
     delay: Ns = MS,
-    codec: Codec = MAVLINK,
+    codec: WireFormat = MAVLINK,
 ) -> tuple[FaultyLink, FaultyLink]:
     """Return the vehicle's end and the autopilot's end of a link over bytes with faults.
 

@@ -26,7 +26,7 @@ from volery.model.fields import (
     Angle,
     Key,
     ListOf,
-    Quantity,
+    QuantityField,
     Record,
     Schema,
     Syntax,
@@ -34,22 +34,22 @@ from volery.model.fields import (
     WrongValueError,
     expected,
 )
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 MOST_BEAMS = 1_000_000
-_RATE = Quantity(units.RATE, above=0, most=500)
-_RANGE = Quantity(units.LENGTH, above=0, most=100_000)
+_RATE = QuantityField(units.RATE, above=0, most=500)
+_RANGE = QuantityField(units.LENGTH, above=0, most=100_000)
 _PITCH = Angle(90.0)
-_CONE = Quantity(units.ANGLE, above=0, most=120)
-_NOISE = Quantity(units.LENGTH, least=0)
-_NEAREST = Quantity(units.LENGTH, least=0)
+_CONE = QuantityField(units.ANGLE, above=0, most=120)
+_NOISE = QuantityField(units.LENGTH, least=0)
+_NEAREST = QuantityField(units.LENGTH, least=0)
 
 
 class _Point(Syntax):
     """Three lengths: forward, left and up."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> tuple[float, ...]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> tuple[float, ...]:
         """See ``Syntax``. The values are in metres."""
         found = ListOf(LENGTH).read(_in_metres(node), path, reading)
         if len(found) != 3:
@@ -61,13 +61,13 @@ class _Point(Syntax):
         return {"type": "array", "items": LENGTH.schema(definitions), "minItems": 3, "maxItems": 3}
 
 
-def _in_metres(node: Node) -> Node:
+def _in_metres(node: TextNode) -> TextNode:
     if not isinstance(node.value, list):
         return node
     bare = [isinstance(one.value, int | float) and not isinstance(one.value, bool) for one in node.value]
-    return Node(
+    return TextNode(
         [
-            Node(f"{one.value!r} m", one.where) if number else one
+            TextNode(f"{one.value!r} m", one.where) if number else one
             for one, number in zip(node.value, bare, strict=True)
         ],
         node.where,
@@ -77,7 +77,7 @@ def _in_metres(node: Node) -> Node:
 class _Name(Syntax):
     """A name of a topic and a frame."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         name = TEXT.read(node, path, reading)
         if re.search(NAME, name) is None:
@@ -113,7 +113,7 @@ class AddedSensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MountedSensor(AddedSensor):
+class SensorSpec(AddedSensor):
     """A sensor at a place of the body."""
 
     at: Annotated[
@@ -124,7 +124,7 @@ class MountedSensor(AddedSensor):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RangingSensor(MountedSensor):
+class RangingSensor(SensorSpec):
     """A sensor of distances."""
 
     range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 12.0
@@ -153,18 +153,20 @@ def added_sensor(kind: str) -> Callable[[C], C]:
 
 @added_sensor("lidar")
 @dataclass(frozen=True, kw_only=True)
-class Lidar(RangingSensor):
+class LidarSpec(RangingSensor):
     """A laser scanner in a plane: `sensor_msgs/LaserScan` on `scan`."""
 
     beams: Annotated[int, Whole(least=2, most=MOST_BEAMS), "Number of its beams."] = 360
     field_deg: Annotated[
-        float, Quantity(units.ANGLE, above=0, most=360), "Angle that they cover, half of it to each side."
+        float,
+        QuantityField(units.ANGLE, above=0, most=360),
+        "Angle that they cover, half of it to each side.",
     ] = 360.0
 
 
 @added_sensor("lidar3d")
 @dataclass(frozen=True, kw_only=True)
-class RingLidar(RangingSensor):
+class RingLidarSpec(RangingSensor):
     """A laser scanner with several rings, one above the other: `sensor_msgs/PointCloud2` on `points`."""
 
     rings: Annotated[int, Whole(least=1, most=256), "Number of its rings."] = 16
@@ -176,19 +178,19 @@ class RingLidar(RangingSensor):
 
 @added_sensor("depth_camera")
 @dataclass(frozen=True, kw_only=True)
-class DepthCamera(RangingSensor):
+class DepthCameraSpec(RangingSensor):
     """A depth camera: `sensor_msgs/Image` of 32FC1 on `depth/image_rect`, and `depth/camera_info`."""
 
     width: Annotated[int, Whole(least=2, most=2048), "Pixels in a row."] = 160
     height: Annotated[int, Whole(least=1, most=2048), "Rows."] = 120
     field_deg: Annotated[
-        float, Quantity(units.ANGLE, above=0, most=170), "Angle from the first column to the last."
+        float, QuantityField(units.ANGLE, above=0, most=170), "Angle from the first column to the last."
     ] = 90.0
 
 
 @added_sensor("range_finder")
 @dataclass(frozen=True, kw_only=True)
-class RangeFinder(RangingSensor):
+class RangeFinderSpec(RangingSensor):
     """A laser range finder, which looks down unless it is turned: `sensor_msgs/Range` on `range`."""
 
     field_deg: Annotated[float, _CONE, "Angle of its cone; it reads the nearest return within."] = 2.0
@@ -210,7 +212,7 @@ class Sonar(RangingSensor):
 
 @added_sensor("imu_external")
 @dataclass(frozen=True, kw_only=True)
-class ExternalImu(AddedSensor):
+class ExternalImuSpec(AddedSensor):
     """A second inertial sensor, of the grade `consumer`: `sensor_msgs/Imu` on `imu_external`."""
 
     rate_hz: Annotated[float, _RATE, "Samples a second."] = 200.0
@@ -219,7 +221,7 @@ class ExternalImu(AddedSensor):
 class _Factors(Syntax):
     """Up to five factors of a lens."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> tuple[float, ...]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> tuple[float, ...]:
         """See ``Syntax``. Factors that are not given are 0."""
         found: tuple[float, ...] = ListOf(NUMBER).read(node, path, reading)
         if len(found) > 5:
@@ -233,14 +235,14 @@ class _Factors(Syntax):
 
 @added_sensor("camera")
 @dataclass(frozen=True, kw_only=True)
-class Camera(MountedSensor):
+class CameraSpec(SensorSpec):
     """A grey camera: `sensor_msgs/Image` (mono8) on `camera/image_raw`, with its `camera/camera_info`."""
 
     width: Annotated[int, Whole(least=16, most=4096), "Columns of a picture."] = 320
     height: Annotated[int, Whole(least=16, most=4096), "Rows of a picture."] = 240
     field_deg: Annotated[
         float,
-        Quantity(units.ANGLE, above=0, most=150),
+        QuantityField(units.ANGLE, above=0, most=150),
         "Angle between left and right edge of a picture.",
     ] = 67.0
     distortion: Annotated[
@@ -268,12 +270,12 @@ class Odometry(AddedSensor):
     drift_deg_s: Annotated[
         float | None,
         Key("drift"),
-        Quantity(units.TURN_RATE),
+        QuantityField(units.TURN_RATE),
         "How fast its heading turns away from the true one, anticlockwise.",
     ] = None
     scale: Annotated[
         float | None,
-        Quantity(units.RATIO, above=-1, most=1),
+        QuantityField(units.RATIO, above=-1, most=1),
         "How much too long it takes every way to be; too short if negative.",
     ] = None
 
@@ -286,11 +288,11 @@ class Odometry(AddedSensor):
 class _AnySensor(Syntax):
     """A kind of the catalogue, alone or with its settings, or the name of a sensor of a package."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         packages = sorted(reading.vocabulary.sensors)
         if isinstance(node.value, str):
-            kind, settings, where = node.value, Node({}, node.where), path
+            kind, settings, where = node.value, TextNode({}, node.where), path
         elif isinstance(node.value, dict) and len(node.items) == 1:
             ((kind, settings),) = node.items.items()
             where = (*path, kind)
@@ -303,7 +305,7 @@ class _AnySensor(Syntax):
                 raise WrongValueError(f"{kind} is of a package and takes no settings: write its name alone")
             return kind
         if settings.value is None:
-            settings = Node({}, settings.where)
+            settings = TextNode({}, settings.where)
         return Record(ADDED_SENSORS[kind]).read(settings, where, reading)
 
     def schema(self, definitions: Schema) -> Schema:

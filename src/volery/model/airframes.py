@@ -22,14 +22,14 @@ from volery.model.fields import (
     VOLTAGE,
     Key,
     OneOf,
-    Quantity,
+    QuantityField,
     Record,
     Shorter,
 )
-from volery.model.prices import PRICE, Price
-from volery.model.reading import Reading
+from volery.model.prices import PRICE, StatedPrice
+from volery.model.reading import ModelReading
 from volery.model.resources import POWER
-from volery.model.text import Node, Path
+from volery.model.text import Path, TextNode
 
 FRAMES = {"quad-x": 4, "quad-plus": 4, "hexa-x": 6, "hexa-plus": 6, "octo-x": 8, "octo-plus": 8}
 """Number of rotors by frame."""
@@ -38,12 +38,12 @@ MOST_COMMAND = 0.95
 """Greatest motor command that autopilots give: ArduPilot's MOT_SPIN_MAX. Thrust grows with its square."""
 GRAVITY = 9.80665
 
-MASS = Quantity(units.MASS, above=0)
-LOAD = Quantity(units.MASS, least=0)
+MASS = QuantityField(units.MASS, above=0)
+LOAD = QuantityField(units.MASS, least=0)
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
+class BatterySpec:
     """A battery. Written as its capacity alone, or as a mapping."""
 
     capacity_coulomb: Annotated[float, CHARGE, "Capacity when full."]
@@ -53,13 +53,13 @@ class Battery:
     ] = None
     resistance_ohm: Annotated[
         float | None,
-        Quantity(units.RESISTANCE, above=0),
+        QuantityField(units.RESISTANCE, above=0),
         "Resistance of the whole battery; with an airframe, by default 11 mOhm a cell over its Ah.",
     ] = None
-    price: Annotated[Price | None, PRICE, "Price of the battery."] = None
+    price: Annotated[StatedPrice | None, PRICE, "Price of the battery."] = None
 
 
-BATTERY = Shorter(Record(Battery), key="capacity")
+BATTERY = Shorter(Record(BatterySpec), key="capacity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +69,18 @@ class Propellers:
     Their power follows from a figure of merit, or from the coefficients of a static test.
     """
 
-    diameter_m: Annotated[float, Quantity(units.LENGTH, above=0, most=1.5), "Diameter."]
+    diameter_m: Annotated[float, QuantityField(units.LENGTH, above=0, most=1.5), "Diameter."]
     figure_of_merit: Annotated[
-        float, Quantity(units.RATIO, above=0, most=1), "Ideal power in hover over that of the shaft."
+        float, QuantityField(units.RATIO, above=0, most=1), "Ideal power in hover over that of the shaft."
     ] = 0.65
     thrust_coefficient: Annotated[
         float | None,
-        Quantity(units.RATIO, above=0, most=1),
+        QuantityField(units.RATIO, above=0, most=1),
         "Static C_T in T = C_T rho n^2 D^4, with n in turns a second.",
     ] = None
     power_coefficient: Annotated[
         float | None,
-        Quantity(units.RATIO, above=0, most=1),
+        QuantityField(units.RATIO, above=0, most=1),
         "Static C_P in P = C_P rho n^3 D^5; with C_T it gives the figure of merit.",
     ] = None
 
@@ -92,11 +92,11 @@ class Motors:
     thrust_n: Annotated[
         float,
         Key("thrust"),
-        Quantity(units.FORCE, above=0),
+        QuantityField(units.FORCE, above=0),
         "Static thrust of one motor with its propeller, at full throttle and a full battery.",
     ]
     efficiency: Annotated[
-        float, Quantity(units.RATIO, above=0, most=1), "Power at the shaft over that from the battery."
+        float, QuantityField(units.RATIO, above=0, most=1), "Power at the shaft over that from the battery."
     ] = 0.8
     lag_ns: Annotated[Ns, PERIOD, "Time constant of the rotors' speed."] = 50 * MS
 
@@ -107,22 +107,26 @@ class Airframe:
 
     frame: Annotated[str, OneOf(tuple(FRAMES)), "Number of its arms, and which way they point."]
     mass_kg: Annotated[float, MASS, "Mass ready for take-off, with battery and computers, without payload."]
-    arm_m: Annotated[float, Quantity(units.LENGTH, above=0, most=2), "Distance of a motor from the centre."]
+    arm_m: Annotated[
+        float, QuantityField(units.LENGTH, above=0, most=2), "Distance of a motor from the centre."
+    ]
     propellers: Annotated[Propellers, Record(Propellers), "Its propellers."]
     motors: Annotated[Motors, Record(Motors), "Its motors."]
-    battery: Annotated[Battery, BATTERY, "Its battery; the `battery` of a vehicle stands in its place."]
+    battery: Annotated[BatterySpec, BATTERY, "Its battery; the `battery` of a vehicle stands in its place."]
     drag_area_m2: Annotated[
         float | None,
-        Quantity(units.AREA, least=0),
+        QuantityField(units.AREA, least=0),
         "Drag coefficient times front area; by default 0.03 m^2 at 1 kg, as the mass to the power 2/3.",
     ] = None
     rotor_drag: Annotated[
         float,
-        Quantity(units.RATIO, least=0, most=2),
+        QuantityField(units.RATIO, least=0, most=2),
         "Momentum drag of the rotors: k in k sqrt(rho A T) v of each.",
     ] = 0.1
     idle_power_w: Annotated[float, POWER, "Power of autopilot, receivers and sensors."] = 5.0
-    price: Annotated[Price | None, PRICE, "Price of the airframe, without battery and computers."] = None
+    price: Annotated[StatedPrice | None, PRICE, "Price of the airframe, without battery and computers."] = (
+        None
+    )
     description: Annotated[str, TEXT, "What it is, and where its figures come from."] = ""
     file: Annotated[str, TEXT, "File with all of this, relative to the model."] = ""
     where: Location | None = field(default=None, compare=False)
@@ -137,7 +141,7 @@ class Airframe:
 class _Airframe(Record):
     """An airframe that can fly."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Airframe:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Airframe:
         """See ``Syntax``."""
         made: Airframe = super().read(node, path, reading)
         rotors, propellers = FRAMES[made.frame], made.propellers

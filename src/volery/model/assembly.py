@@ -17,11 +17,11 @@ from volery.model import rules
 from volery.model.builder import TEXT_NAME, ModelBuilder
 from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
 from volery.model.replication import is_counted, leads_to_copy, replicate
-from volery.model.system import Source
+from volery.model.system import ModelFile
 from volery.model.text import (
-    Node,
     Path,
     Problems,
+    TextNode,
     is_inside,
     no_such,
     outside,
@@ -37,7 +37,7 @@ class Change:
     """A change: put *value* at *path*. ``stated_at`` is the path in the model that states it, if any."""
 
     path: Path
-    value: Node
+    value: TextNode
     stated_at: Path = ()
 
     @property
@@ -66,14 +66,14 @@ def change_from_option(text: str) -> Change:
     return Change(split_path(path.strip()), parse_value(value, Location(f"--set {text}", 0)))
 
 
-def changes_from_mapping(node: Node | None, stated_at: Path) -> list[Change]:
+def changes_from_mapping(node: TextNode | None, stated_at: Path) -> list[Change]:
     """Return the changes of a ``set:`` mapping, in its order."""
     if node is None:
         return []
     return [Change(split_path(key), value, (*stated_at, key)) for key, value in node.items.items()]
 
 
-def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> None:
+def apply_changes(root: TextNode, changes: Iterable[Change], problems: Problems) -> None:
     """Change *root* in place; report paths that do not exist."""
     for change in changes:
         complaint = _apply(root, change)
@@ -83,7 +83,7 @@ def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> 
             problems.add(change.stated_at or change.path, complaint, change.where, rules.BAD_CHANGE)
 
 
-def _apply(root: Node, change: Change) -> str:
+def _apply(root: TextNode, change: Change) -> str:
     node = root
     for depth, step in enumerate(change.path[:-1]):
         below = node.child(step)
@@ -91,23 +91,23 @@ def _apply(root: Node, change: Change) -> str:
             complaint = _cannot_make(node, change.path[: depth + 1])
             if complaint:
                 return complaint
-            below = Node({}, change.where)
+            below = TextNode({}, change.where)
             node.items[str(step)] = below
         _lengthen(below, change.path[: depth + 1])
         node = below
     return _put(node, change)
 
 
-def _lengthen(node: Node, path: Path) -> None:
+def _lengthen(node: TextNode, path: Path) -> None:
     """Expand a value in its short form to the mapping: ``battery: 5 Ah`` has a ``capacity``."""
     if node.value is None:
         node.value = {}
     key = short_key(path)
     if key is not None and not isinstance(node.value, dict | list):
-        node.value = {key: Node(node.value, node.where, node.quoted)}
+        node.value = {key: TextNode(node.value, node.where, node.quoted)}
 
 
-def _cannot_make(node: Node, path: Path) -> str:
+def _cannot_make(node: TextNode, path: Path) -> str:
     """Return why a mapping cannot be made at *path*; empty if it can."""
     known = keys_at(path[:-1]) or []
     if path[-1] in known:
@@ -119,7 +119,7 @@ def _cannot_make(node: Node, path: Path) -> str:
     return f"{written(path[:-1])} is {_shown(node)}: nothing below it can be set"
 
 
-def _put(node: Node, change: Change) -> str:
+def _put(node: TextNode, change: Change) -> str:
     last = change.path[-1]
     value = change.value.copy()
     if isinstance(node.value, list):
@@ -139,7 +139,7 @@ def _put(node: Node, change: Change) -> str:
     return ""
 
 
-def _shown(node: Node) -> str:
+def _shown(node: TextNode) -> str:
     return "a list" if isinstance(node.value, list) else repr(node.value)
 
 
@@ -154,12 +154,12 @@ class Assembly:
     ``stated`` is the tree before a number of vehicles is replaced by the copies.
     """
 
-    root: Node
-    sources: tuple[Source, ...]
-    stated: Node = field(init=False)
+    root: TextNode
+    sources: tuple[ModelFile, ...]
+    stated: TextNode = field(init=False)
     allocation: str = ""
     scenario: str = ""
-    places: dict[str, Node] | None = None
+    places: dict[str, TextNode] | None = None
 
     def __post_init__(self) -> None:
         """See ``stated``."""
@@ -209,7 +209,7 @@ def model_file(path: str | FilePath) -> FilePath:
     return path / DEFAULT_FILE if path.is_dir() else path
 
 
-def read_tree(file: FilePath) -> Node:
+def read_tree(file: FilePath) -> TextNode:
     """Return the tree of a model as its files state it, without an allocation or a scenario.
 
     A number of vehicles is replaced by the copies; the geography is part of the tree then.
@@ -233,24 +233,24 @@ def _read_files(file: FilePath) -> tuple[Assembly, Problems]:
         what = f"this is UML: `volery model import {file} --out model.yaml` makes the model of it that runs"
         raise ModelError(what, "", Location(str(file), 1), rules.NOT_A_MODEL.code)
     root, text = _read_mapping(file, str(file), "a model is a mapping that starts with `volery: 1`")
-    made = Assembly(root, (Source(file.name, text),))
+    assembly = Assembly(root, (ModelFile(file.name, text),))
     problems = Problems(root.locate)
-    _include(made, root, file.parent, problems, (file.resolve(),))
-    return made, problems
+    _include(assembly, root, file.parent, problems, (file.resolve(),))
+    return assembly, problems
 
 
 def _built(model: ModelBuilder) -> tuple[Assembly, Problems]:
     """Return the tree of a model that was built in Python, with the files that it includes."""
     root = model.root.copy()
-    made = Assembly(root, (Source(TEXT_NAME, model.text()),))
+    assembly = Assembly(root, (ModelFile(TEXT_NAME, model.text()),))
     problems = Problems(root.locate)
-    _include(made, root, model.folder, problems, ())
-    return made, problems
+    _include(assembly, root, model.folder, problems, ())
+    return assembly, problems
 
 
 def _read_mapping(
     file: FilePath, name: str, expected: str, where: Location | None = None, at: Path = ()
-) -> tuple[Node, str]:
+) -> tuple[TextNode, str]:
     text = read_text(file, name, where, at)
     root = parse(text, str(file))
     if not isinstance(root.value, dict):
@@ -259,13 +259,13 @@ def _read_mapping(
 
 
 def _include(
-    made: Assembly, part: Node, folder: FilePath, problems: Problems, open_: tuple[FilePath, ...]
+    made: Assembly, part: TextNode, folder: FilePath, problems: Problems, open_: tuple[FilePath, ...]
 ) -> None:
     """Add the files that *part* includes to the tree; *open_* are the files that are being read."""
     node = part.items.pop("include", None)
     listed = node.value if node is not None and isinstance(node.value, list) else [node] if node else []
     for one in listed:
-        if not isinstance(one, Node) or not isinstance(one.value, str):
+        if not isinstance(one, TextNode) or not isinstance(one.value, str):
             problems.add(("include",), "a file name is expected", node.where if node else None)
             continue
         file = folder / one.value
@@ -278,12 +278,12 @@ def _include(
         included, text = _read_mapping(
             file, one.value, "an included file is a mapping", one.where, ("include",)
         )
-        made.sources = (*made.sources, Source(one.value, text))
+        made.sources = (*made.sources, ModelFile(one.value, text))
         _include(made, included, folder, problems, (*open_, file.resolve()))
         _add_entries(made.root, included, (), problems)
 
 
-def _add_entries(root: Node, included: Node, path: Path, problems: Problems) -> None:
+def _add_entries(root: TextNode, included: TextNode, path: Path, problems: Problems) -> None:
     """Add the entries of *included* to *root*; what both state must be mappings of different entries."""
     for key, below in included.items.items():
         own = root.items.get(key)
@@ -298,8 +298,8 @@ def _add_entries(root: Node, included: Node, path: Path, problems: Problems) -> 
             problems.add((*path, key), what, own.where, rules.DUPLICATE_KEY)
 
 
-def _allowed(root: Node, folder: FilePath, file: FilePath) -> bool:
-    return is_inside(file, [folder, *(folder / one for one in stated_texts(root, "files_from"))])
+def _allowed(root: TextNode, folder: FilePath, file: FilePath) -> bool:
+    return is_inside(file, [folder, *(folder / text for text in stated_texts(root, "files_from"))])
 
 
 def assemble(model: FilePath | ModelBuilder, selection: Selection) -> tuple[Assembly, Problems]:
@@ -358,7 +358,7 @@ def _choose_allocation(made: Assembly, selection: Selection, problems: Problems)
     if not name:
         return []
     found: list[Change] = []
-    places: dict[str, Node] = {}
+    places: dict[str, TextNode] = {}
     for step in _chain(made.root, "allocations", name, problems):
         at = ("allocations", step)
         found += changes_from_mapping(made.root.at((*at, "set")), (*at, "set"))
@@ -379,12 +379,12 @@ def _scenarios_allocation(made: Assembly, problems: Problems) -> str:
     return ""
 
 
-def _names(root: Node, section: str) -> list[str]:
+def _names(root: TextNode, section: str) -> list[str]:
     node = root.child(section)
     return list(node.items) if node else []
 
 
-def _chain(root: Node, section: str, name: str, problems: Problems) -> list[str]:
+def _chain(root: TextNode, section: str, name: str, problems: Problems) -> list[str]:
     """Return *name* and what it extends, the first ancestor first."""
     names = _names(root, section)
     if name not in names:
@@ -415,7 +415,7 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
         problems.add(WORLD, outside(name), said.where, rules.OUTSIDE)
         return
     world, text = _read_mapping(folder / name, name, "a world file is a mapping", said.where, WORLD)
-    made.sources = (*made.sources, Source(name, text))
+    made.sources = (*made.sources, ModelFile(name, text))
     environment = made.root.at(("environment",))
     if environment is None or not isinstance(environment.value, dict):
         return
@@ -432,7 +432,7 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
 
 def _merge_airframes(made: Assembly, folder: FilePath, problems: Problems) -> None:
     """Replace the name of an airframe's file by what the file states, with the model's own entries on top."""
-    files_read: dict[str, Node] = {}
+    files_read: dict[str, TextNode] = {}
     vehicles = made.root.at(("environment", "vehicles"))
     for name, vehicle in vehicles.items.items() if vehicles else ():
         stated = vehicle.child("airframe")
@@ -447,13 +447,14 @@ def _merge_airframes(made: Assembly, folder: FilePath, problems: Problems) -> No
         if file not in files_read:
             what = "an airframe is a mapping that states its frame, mass, arm, propellers, motors and battery"
             files_read[file], text = _read_mapping(folder / file, file, what, said.where, path)
-            made.sources = (*made.sources, Source(file, text))
+            made.sources = (*made.sources, ModelFile(file, text))
         vehicle.items["airframe"] = _on_top(
-            stated if isinstance(stated.value, dict) else Node({"file": said}, stated.where), files_read[file]
+            stated if isinstance(stated.value, dict) else TextNode({"file": said}, stated.where),
+            files_read[file],
         )
 
 
-def _on_top(own: Node, below: Node) -> Node:
+def _on_top(own: TextNode, below: TextNode) -> TextNode:
     """Return a tree with the entries of another one on top, mapping by mapping."""
     if not isinstance(own.value, dict) or not isinstance(below.value, dict):
         return own
@@ -461,14 +462,14 @@ def _on_top(own: Node, below: Node) -> Node:
         key: _on_top(node, below.items[key]) if key in below.items else node
         for key, node in own.items.items()
     }
-    return Node({**below.items, **both}, below.where)
+    return TextNode({**below.items, **both}, below.where)
 
 
 def _listed(known: list[str]) -> str:
     return f"it has {', '.join(known)}"
 
 
-def _under(own: Node | None, world: Node) -> Node:
+def _under(own: TextNode | None, world: TextNode) -> TextNode:
     """Return the world's part with the model's own entries on top."""
     if own is None:
         return world

@@ -14,7 +14,7 @@ from typing import Any
 
 from volery.base.errors import Location, UsageError
 from volery.base.files import write_text
-from volery.model.text import Node, Quoted
+from volery.model.text import Quoted, TextNode
 from volery.model.writing import model_text
 
 TEXT_NAME = "model.yaml"
@@ -74,12 +74,12 @@ class ModelBuilder:
         """Write the model as YAML, for the command line and for git. Raises ``OSError``."""
         write_text(FilePath(file), self.text())
 
-    def _mapping(self, path: str, where: Location) -> dict[str, Node]:
+    def _mapping(self, path: str, where: Location) -> dict[str, TextNode]:
         node = self.root
         for step in path.split(".") if path else ():
             entries = node.value
             assert isinstance(entries, dict)
-            below = entries.setdefault(step, Node({}, where))
+            below = entries.setdefault(step, TextNode({}, where))
             if below.value is None:
                 below.value = {}
             if not isinstance(below.value, dict):
@@ -101,14 +101,14 @@ def _caller() -> Location:
     return Location(frame.f_code.co_filename, frame.f_lineno)
 
 
-def plain_node(value: Any, where: Location) -> Node:
+def plain_node(value: Any, where: Location) -> TextNode:
     """Return plain Python data as a tree, every node of which stands at *where*."""
     if isinstance(value, Mapping):
-        return Node({str(key): plain_node(below, where) for key, below in value.items()}, where)
+        return TextNode({str(key): plain_node(below, where) for key, below in value.items()}, where)
     if isinstance(value, list | tuple):
-        return Node([plain_node(below, where) for below in value], where)
+        return TextNode([plain_node(below, where) for below in value], where)
     if isinstance(value, FilePath):
-        return Node(value.as_posix(), where)
+        return TextNode(value.as_posix(), where)
     if isinstance(value, bool | int | float | str | None):
-        return Node(str(value) if isinstance(value, Quoted) else value, where, isinstance(value, Quoted))
+        return TextNode(str(value) if isinstance(value, Quoted) else value, where, isinstance(value, Quoted))
     raise UsageError(f"{where}: {value!r} is no value of a model: a text, a number, a list or a mapping is")

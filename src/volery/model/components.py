@@ -39,8 +39,8 @@ from volery.model.fields import (
     WrongValueError,
     expected,
 )
-from volery.model.reading import PROVENANCES, Reading
-from volery.model.text import Node, Path, is_inside, outside, stated_texts
+from volery.model.reading import PROVENANCES, ModelReading
+from volery.model.text import Path, TextNode, is_inside, outside, stated_texts
 
 Value = bool | int | float | str | None | Sequence["Value"] | Mapping[str, "Value"]
 """A parameter: what YAML can state. A number with a unit (``6 / h``) arrives as an SI number."""
@@ -87,7 +87,7 @@ class Argument:
 class _Arguments(Syntax):
     """Names of arguments with their types."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> tuple[Argument, ...]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> tuple[Argument, ...]:
         """See ``Syntax``."""
         types = MapOf(TEXT).read(node, path, reading)
         assert isinstance(types, dict)
@@ -131,7 +131,7 @@ class Interface:
 class _Interface(Syntax):
     """An interface: its operations by name."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Interface:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Interface:
         """See ``Syntax``."""
         name = str(path[-1])
         if name in SPECIAL_INTERFACES:
@@ -148,7 +148,7 @@ class _Interface(Syntax):
 INTERFACES = MapOf(_Interface())
 
 
-def _operations_of(interface: str, reading: Reading) -> list[str]:
+def _operations_of(interface: str, reading: ModelReading) -> list[str]:
     return reading.names(("interfaces", interface))
 
 
@@ -156,7 +156,7 @@ def _operations_of(interface: str, reading: Reading) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class StatedAt:
     """The processor of the catalogue and the frequency that a figure was stated at."""
 
     processor: Annotated[str, PROCESSOR_KIND, "Kind of processor."]
@@ -166,17 +166,17 @@ class Reference:
 class _Reference(Record):
     """A reference whose frequency is within the catalogue's range."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Reference:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> StatedAt:
         """See ``Syntax``."""
-        made: Reference = super().read(node, path, reading)
+        made: StatedAt = super().read(node, path, reading)
         check_frequency(reading, path, made.processor, made.frequency_hz)
         return made
 
 
-REFERENCE = _Reference(Reference)
+REFERENCE = _Reference(StatedAt)
 
 
-def check_frequency(reading: Reading, path: Path, kind: str, frequency_hz: float) -> None:
+def check_frequency(reading: ModelReading, path: Path, kind: str, frequency_hz: float) -> None:
     """Report it if *frequency_hz*, stated in the mapping at *path*, is outside the range of the processor."""
     known = reading.vocabulary.processors.get(kind)
     if known is not None and not known.least_hz <= frequency_hz <= known.greatest_hz:
@@ -189,14 +189,14 @@ def check_frequency(reading: Reading, path: Path, kind: str, frequency_hz: float
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class StatedFigure:
     """What an operation or an activation takes, stated at a processor of the catalogue and a frequency.
 
     ``energy_j`` is None where the model states none. A law scales it to other frequencies of the processor.
     """
 
     time_ns: Annotated[Ns, TIME, "Execution time."]
-    at: Annotated[Reference, REFERENCE, "Where it was taken; that of the component if it is not given."]
+    at: Annotated[StatedAt, REFERENCE, "Where it was taken; that of the component if it is not given."]
     energy_j: Annotated[float | None, ENERGY, "Energy; by the processor's law if it is not given."] = None
     provenance: Annotated[str, OneOf(PROVENANCES), "Where the figure comes from."] = "estimated"
     best_ns: Annotated[Ns | None, TIME, "Shortest time; `time`, the mean, if it is not given."] = None
@@ -222,7 +222,7 @@ class Figure:
         return self.at.frequency_hz
 
 
-def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
+def _with_reference(node: TextNode, path: Path, reading: ModelReading) -> TextNode:
     """Add the component's reference to a figure without one of its own."""
     if "at" in node.items:
         return node
@@ -238,9 +238,9 @@ def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
 class _Figure(Record):
     """A figure whose times are in order."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Figure:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> StatedFigure:
         """See ``Syntax``."""
-        made: Figure = super().read(node, path, reading)
+        made: StatedFigure = super().read(node, path, reading)
         best = made.time_ns if made.best_ns is None else made.best_ns
         if not best <= made.time_ns <= made.longest_ns:
             what = "its times are out of order: best is at most time, and time at most worst"
@@ -248,7 +248,7 @@ class _Figure(Record):
         return made
 
 
-FIGURES = ListOf(_Figure(Figure, prepare=_with_reference, supplied=("at",)), bare=True)
+FIGURES = ListOf(_Figure(StatedFigure, prepare=_with_reference, supplied=("at",)), bare=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +267,7 @@ class Activity:
     jitter_ns: Annotated[Ns, TIME, "Most that a release comes after it is due."] = 0
 
 
-def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
+def _with_deadline(node: TextNode, path: Path, reading: ModelReading) -> TextNode:
     """Make the period the deadline where none is stated."""
     if "period" in node.items and "deadline" not in node.items:
         reading.problems.copied((*path, "deadline"), (*path, "period"))
@@ -290,7 +290,7 @@ class Assumptions:
         Ns | None, PERIOD, "Least time from the end of an activation to the next release."
     ] = None
     beside: Annotated[
-        tuple[Figure, ...],
+        tuple[StatedFigure, ...],
         FIGURES,
         "What an activation executes at most beside its stated time: the driver of a vehicle, or what its "
         "code charges by `volery.add_time`. `best` is what it executes at least when it does its work.",
@@ -304,7 +304,7 @@ class Assumptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Publication:
+class PublishedTopic:
     """A topic that a component publishes, by its name before remapping."""
 
     name: str
@@ -317,7 +317,7 @@ class Publication:
 
 
 @dataclass(frozen=True, slots=True)
-class Subscription:
+class SubscriptionSpec:
     """A topic that a component subscribes to, by its name before remapping."""
 
     name: str
@@ -325,7 +325,7 @@ class Subscription:
 
 
 @dataclass(frozen=True, slots=True)
-class Queue:
+class QueueSpec:
     """What a port does with calls that wait (S3D's ClientServerQueuePort)."""
 
     size: Annotated[int | None, Whole(least=1), "Calls that may wait; any number if it is not given."] = None
@@ -339,9 +339,9 @@ class Queue:
 class _Queues(Syntax):
     """Queues by the names of the component's ports."""
 
-    below = MapOf(Record(Queue))
+    below = MapOf(Record(QueueSpec))
 
-    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Queue]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> dict[str, QueueSpec]:
         """See ``Syntax``."""
         made = self.below.read(node, path, reading)
         assert isinstance(made, dict)
@@ -375,7 +375,7 @@ class RequiredPort:
 class _RequiredPort(Syntax):
     """The name of an interface; ``Name[]`` for any number of providers."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> RequiredPort:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> RequiredPort:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -398,7 +398,7 @@ INSTANCE_KEYS = ("is", "component", "parameters", "arguments", "active", "namesp
 class _ProvidedPort(Syntax):
     """The name of an interface of the model."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -416,9 +416,9 @@ class _ProvidedPort(Syntax):
         return {"type": "string"}
 
 
-def check_inside(reading: Reading, path: Path, name: str) -> None:
+def check_inside(reading: ModelReading, path: Path, name: str) -> None:
     """Report a file outside the model's folder and the folders of ``files_from``."""
-    allowed = [reading.folder, *(reading.folder / one for one in stated_texts(reading.root, "files_from"))]
+    allowed = [reading.folder, *(reading.folder / text for text in stated_texts(reading.root, "files_from"))]
     if not is_inside(reading.folder / name, allowed):
         reading.problems.add(path, outside(name), rule=rules.OUTSIDE)
 
@@ -426,7 +426,7 @@ def check_inside(reading: Reading, path: Path, name: str) -> None:
 class FileBeside(Syntax):
     """A file beside the model, which has to be there."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> FilePath:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> FilePath:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -445,7 +445,7 @@ class FileBeside(Syntax):
 class _File(Syntax):
     """A file beside the model; a folder, too, for C++."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -466,7 +466,7 @@ class _File(Syntax):
 
 
 @dataclass(frozen=True, slots=True)
-class Build:
+class CompilerOptions:
     """How C++ is compiled."""
 
     flags: Annotated[tuple[str, ...], ListOf(TEXT, bare=True), "Options for the compiler."] = ()
@@ -531,7 +531,7 @@ class Component:
         "Command-line arguments of a script; those of ROS (`a:=b`, `--ros-args`) among them.",
     ] = ()
     on_failure: Annotated[OnFailure, ON_FAILURE, "What follows when it fails."] = OnFailure()
-    build: Annotated[Build, Record(Build), "How C++ is compiled."] = Build()
+    build: Annotated[CompilerOptions, Record(CompilerOptions), "How C++ is compiled."] = CompilerOptions()
     files: Annotated[
         Mapping[str, str],
         MapOf(TEXT, free=True),
@@ -555,18 +555,18 @@ class Component:
         ACTIVITY,
         "Its own flow of control; `true` for one without a period. Passive if it is not given.",
     ] = None
-    at: Annotated[Reference | None, REFERENCE, "Where its figures were taken that do not state it."] = None
+    at: Annotated[StatedAt | None, REFERENCE, "Where its figures were taken that do not state it."] = None
     operations: Annotated[
-        Mapping[str, tuple[Figure, ...]],
+        Mapping[str, tuple[StatedFigure, ...]],
         MapOf(FIGURES),
         "What each operation of its provided ports takes, one figure for each kind of processor.",
     ] = field(default_factory=dict)
     activation: Annotated[
-        tuple[Figure, ...], FIGURES, "What an activation takes, one figure for each kind of processor."
+        tuple[StatedFigure, ...], FIGURES, "What an activation takes, one figure for each kind of processor."
     ] = ()
-    queues: Annotated[Mapping[str, Queue], _Queues(), "What a port does with calls that wait, by port."] = (
-        field(default_factory=dict)
-    )
+    queues: Annotated[
+        Mapping[str, QueueSpec], _Queues(), "What a port does with calls that wait, by port."
+    ] = field(default_factory=dict)
     calls: Annotated[
         Mapping[str, Mapping[str, int]],
         CALLS,
@@ -574,10 +574,12 @@ class Component:
         "as `publish`, and how many. Static analysis needs it.",
     ] = field(default_factory=dict)
     publishes: Annotated[
-        Mapping[str, Publication], MapOf(Record(Publication), free=True), "Topics that it publishes."
+        Mapping[str, PublishedTopic], MapOf(Record(PublishedTopic), free=True), "Topics that it publishes."
     ] = field(default_factory=dict)
     subscribes: Annotated[
-        Mapping[str, Subscription], MapOf(Record(Subscription), free=True), "Topics that it subscribes to."
+        Mapping[str, SubscriptionSpec],
+        MapOf(Record(SubscriptionSpec), free=True),
+        "Topics that it subscribes to.",
     ] = field(default_factory=dict)
     memory_b: Annotated[float | None, DATA_SIZE, "Greatest memory of its process that it takes."] = None
     assume: Annotated[
@@ -595,10 +597,10 @@ class Component:
 class _Component(Record):
     """A component whose figures are of operations that it provides."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Component:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Component:
         """See ``Syntax``."""
         made: Component = super().read(node, path, reading)
-        offered = [name for one in made.provides.values() for name in _operations_of(one, reading)]
+        offered = [name for provide in made.provides.values() for name in _operations_of(provide, reading)]
         for operation in made.operations:
             at = (*path, "operations", operation)
             reading.known(at, operation, "operation of its provided ports", offered)
@@ -614,7 +616,7 @@ class _Component(Record):
         return made
 
 
-def _check_call(path: Path, call: str, component: Component, reading: Reading) -> None:
+def _check_call(path: Path, call: str, component: Component, reading: ModelReading) -> None:
     """Report a call that is neither of a required port nor a ROS call."""
     port, dot, operation = call.partition(".")
     if not dot:
@@ -624,8 +626,8 @@ def _check_call(path: Path, call: str, component: Component, reading: Reading) -
         reading.known(path, operation, "operation of that port", offered)
 
 
-def library(reading: Reading) -> dict[str, Component]:
-    """Return the components of the model. Use with ``Reading.once``."""
+def library(reading: ModelReading) -> dict[str, Component]:
+    """Return the components of the model. Use with ``ModelReading.once``."""
     node = reading.root.at(LIBRARY)
     if node is None or not isinstance(node.value, dict):
         return {}

@@ -14,7 +14,7 @@ from typing import Annotated
 from volery.base.errors import Location
 from volery.model import rules
 from volery.model.fields import TEXT, ListOf, MapOf, Record, Shorter
-from volery.model.reading import Reading
+from volery.model.reading import ModelReading
 from volery.model.text import Path
 
 SECTION: Path = ("types",)
@@ -40,7 +40,7 @@ class DataType:
 DATA_TYPES = MapOf(Shorter(Record(DataType), empty=True))
 
 
-def check_type(reading: Reading, path: Path, text: str) -> None:
+def check_type(reading: ModelReading, path: Path, text: str) -> None:
     """Report the types of *text* that the model does not declare, if it declares any.
 
     A unit may follow the type (``float m``); a message type has a ``/``.

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from volery.base.errors import Location
 from volery.model import rules
 from volery.model.fields import AS_WRITTEN, TEXT, ListOf, MapOf, Record, Schema, Syntax, WrongValueError
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class DesignParameter:
 class _DesignParameter(Record):
     """A design parameter that sets values which the model has."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> DesignParameter:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> DesignParameter:
         """See ``Syntax``."""
         made: DesignParameter = super().read(node, path, reading)
         for text in made.paths:
@@ -50,7 +50,7 @@ class Suppression:
     at: Annotated[str, TEXT, "Path below which it is suppressed; everywhere if it is not given."] = ""
     where: Location | None = field(default=None, compare=False)
 
-    def covers(self, finding: rules.Finding) -> bool:
+    def covers(self, finding: rules.BrokenRule) -> bool:
         """Return whether *finding* is suppressed by this."""
         rule = rules.find(self.rule)
         below = not self.at or finding.path == self.at or finding.path.startswith(f"{self.at}.")
@@ -62,7 +62,7 @@ class _Suppression(Syntax):
 
     record = Record(Suppression)
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Suppression:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Suppression:
         """See ``Syntax``."""
         made: Suppression = self.record.read(node, path, reading)
         rule = rules.find(made.rule)

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 
 from volery.base.time import Ns, to_seconds
 from volery.model.components import Activity
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.model.instances import Instance
-from volery.model.system import Network, Processor, System
+from volery.model.system import NetworkSpec, ProcessorSpec, System
 
 
 def diagram(system: System) -> str:
@@ -23,7 +23,9 @@ def _lines(system: System) -> Iterator[str]:
     for processor in system.processors:
         yield ""
         yield _processor(processor)
-        yield from _instances(one for one in system.instances if one.processor == processor.name)
+        yield from _instances(
+            instance for instance in system.instances if instance.processor == processor.name
+        )
         for vehicle in system.vehicles:
             if vehicle.processor == processor.name:
                 yield f"  └ node of {vehicle.name}"
@@ -44,7 +46,7 @@ def _section(title: str, lines: Iterable[str]) -> Iterator[str]:
         yield from (f"  ├ {line}" for line in listed)
 
 
-def _processor(processor: Processor) -> str:
+def _processor(processor: ProcessorSpec) -> str:
     speed = f"{processor.kind} at {processor.frequency_mhz:g} MHz × {processor.cores}, {processor.scheduler}"
     carried = f", carried by {processor.carried_by}" if processor.carried_by else ""
     return f"{processor.name}: {speed}{carried}"
@@ -69,13 +71,13 @@ def _milliseconds(time: Ns) -> str:
     return f"{to_seconds(time) * 1000:g} ms"
 
 
-def _network(network: Network) -> str:
+def _network(network: NetworkSpec) -> str:
     ends = " — ".join(network.between)
     latency = _milliseconds(network.latency_ns)
     return f"{network.name}: {ends}, {network.bandwidth_bit_s:g} bit/s, {latency}, {network.loss:.2%} lost"
 
 
-def _vehicle(vehicle: Vehicle) -> str:
+def _vehicle(vehicle: VehicleSpec) -> str:
     at = vehicle.at
     place = f"{at.name} ({at.east_m:g} m east, {at.north_m:g} m north)"
     return f"{vehicle.name}: {vehicle.kind}, {vehicle.autopilot}, {vehicle.sensors}, at {place}"

@@ -12,7 +12,7 @@ from pathlib import PurePath
 from typing import Any
 
 from volery.model.components import Component
-from volery.model.environment import Place, Ways
+from volery.model.environment import PlaceSpec, Ways
 from volery.model.instances import Instance
 from volery.model.system import System
 
@@ -61,7 +61,7 @@ _SHORT = 60
 
 
 @dataclass(frozen=True)
-class Difference:
+class ModelDifference:
     """One difference: what kind of thing, its name, which property, and the values before and after."""
 
     noun: str
@@ -80,7 +80,7 @@ class Difference:
         return f"{subject}: {self.property} {self.before} → {self.after}"
 
 
-def differences(before: System, after: System) -> tuple[Difference, ...]:
+def differences(before: System, after: System) -> tuple[ModelDifference, ...]:
     """Return what differs between two systems, section by section.
 
     What an instance has from its component is a difference of the component alone.
@@ -98,7 +98,7 @@ def differences(before: System, after: System) -> tuple[Difference, ...]:
     )
 
 
-def _differences(before: System, after: System) -> Iterator[Difference]:
+def _differences(before: System, after: System) -> Iterator[ModelDifference]:
     for section in SECTIONS:
         noun = _NOUNS[section]
         old, new = _tree(getattr(before, section)), _tree(getattr(after, section))
@@ -106,36 +106,36 @@ def _differences(before: System, after: System) -> Iterator[Difference]:
             yield from _compare(noun, "", (), old, new)
         elif not isinstance(old, dict) or not isinstance(new, dict):
             if old != new:
-                yield Difference(noun, "", CHANGED, section, _shown(section, old), _shown(section, new))
+                yield ModelDifference(noun, "", CHANGED, section, _shown(section, old), _shown(section, new))
         else:
             yield from _named(noun, old, new)
 
 
-def _named(noun: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[Difference]:
+def _named(noun: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[ModelDifference]:
     for name in dict.fromkeys((*old, *new)):
         if name not in new:
-            yield Difference(noun, name, REMOVED)
+            yield ModelDifference(noun, name, REMOVED)
         elif name not in old:
-            yield Difference(noun, name, ADDED)
+            yield ModelDifference(noun, name, ADDED)
         else:
             yield from _compare(noun, name, (), old[name], new[name])
 
 
-def _compare(noun: str, name: str, path: tuple[str, ...], old: Any, new: Any) -> Iterator[Difference]:
+def _compare(noun: str, name: str, path: tuple[str, ...], old: Any, new: Any) -> Iterator[ModelDifference]:
     if old == new:
         return
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys((*old, *new)):
             here = (*path, key)
             if key not in new:
-                yield Difference(noun, name, REMOVED, _dotted(here), _shown(key, old[key]))
+                yield ModelDifference(noun, name, REMOVED, _dotted(here), _shown(key, old[key]))
             elif key not in old:
-                yield Difference(noun, name, ADDED, _dotted(here), after=_shown(key, new[key]))
+                yield ModelDifference(noun, name, ADDED, _dotted(here), after=_shown(key, new[key]))
             else:
                 yield from _compare(noun, name, here, old[key], new[key])
         return
     key = path[-1] if path else ""
-    yield Difference(noun, name, CHANGED, _dotted(path), _shown(key, old), _shown(key, new))
+    yield ModelDifference(noun, name, CHANGED, _dotted(path), _shown(key, old), _shown(key, new))
 
 
 def _tree(thing: Any) -> Any:
@@ -144,7 +144,7 @@ def _tree(thing: Any) -> Any:
     A file is its name: two models are compared that may stand in two folders.
     """
     made: Any = thing
-    if isinstance(thing, Place):
+    if isinstance(thing, PlaceSpec):
         role = f", {thing.role}" if thing.role else ""
         made = f"{thing.east_m:g} m east, {thing.north_m:g} m north{role}"
     elif isinstance(thing, Ways):
@@ -158,7 +158,9 @@ def _tree(thing: Any) -> Any:
         made = thing.name
     elif is_dataclass(thing) and not isinstance(thing, type):
         made = {
-            one.name: _part(thing, one.name) for one in fields(thing) if one.compare and one.name != "name"
+            field.name: _part(thing, field.name)
+            for field in fields(thing)
+            if field.compare and field.name != "name"
         }
     elif isinstance(thing, Sequence) and not isinstance(thing, str):
         named = thing and all(is_dataclass(one) and hasattr(one, "name") for one in thing)

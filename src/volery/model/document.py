@@ -20,10 +20,10 @@ from volery.model.fields import (
     TEXT,
     ListOf,
     MapOf,
+    NameField,
     OneOf,
     Others,
     Record,
-    Reference,
     Schema,
 )
 from volery.model.instances import INSTANCES, Instance
@@ -40,18 +40,18 @@ from volery.model.system import (
     CHAINS,
     NETWORKS,
     PROCESSORS,
-    Bound,
     BoundText,
     Chain,
-    Network,
-    Processor,
+    NetworkSpec,
+    ProcessorSpec,
+    RequiredBound,
     RunLimits,
 )
 from volery.model.text import Path
 
-ALLOCATION = Reference("allocation", lambda reading: reading.names(("allocations",)))
-SCENARIO = Reference("scenario", lambda reading: reading.names(("scenarios",)))
-PLACE = Reference(
+ALLOCATION = NameField("allocation", lambda reading: reading.names(("allocations",)))
+SCENARIO = NameField("scenario", lambda reading: reading.names(("scenarios",)))
+PLACE = NameField(
     "processor, operating system or memory space",
     lambda reading: reading.names(
         ("platform", "processors"), ("platform", "operating_systems"), ("memory_spaces",)
@@ -70,8 +70,8 @@ class Platform:
         "Files with kinds of processors beside the built-in ones, such as `volery cost calibrate` writes, "
         "relative to the model.",
     ] = ()
-    processors: Annotated[tuple[Processor, ...], PROCESSORS, "Computers, by name."] = ()
-    networks: Annotated[tuple[Network, ...], NETWORKS, "What joins the computers, by name."] = ()
+    processors: Annotated[tuple[ProcessorSpec, ...], PROCESSORS, "Computers, by name."] = ()
+    networks: Annotated[tuple[NetworkSpec, ...], NETWORKS, "What joins the computers, by name."] = ()
     operating_systems: Annotated[
         tuple[OperatingSystem, ...], OPERATING_SYSTEMS, "Operating systems, by name."
     ] = ()
@@ -173,7 +173,7 @@ class Document:
         "Rows of topics by their full names, whose end-to-end latency can be observed: `NAME.latency`.",
     ] = ()
     requirements: Annotated[
-        tuple[Bound, ...], BOUNDS, "Bounds on observed quantities, judged at the end of each run."
+        tuple[RequiredBound, ...], BOUNDS, "Bounds on observed quantities, judged at the end of each run."
     ] = ()
     run: Annotated[RunLimits, Record(RunLimits), "How long a run lasts."] = field(default_factory=RunLimits)
     design_parameters: Annotated[

@@ -22,7 +22,7 @@ from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.model import rules
 from volery.model.added_sensors import ADDED_SENSOR, AddedSensor, Odometry
-from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
+from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, BatterySpec
 from volery.model.components import FileBeside
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
@@ -43,7 +43,7 @@ from volery.model.fields import (
     ListOf,
     MapOf,
     OneOf,
-    Quantity,
+    QuantityField,
     Record,
     Schema,
     Shared,
@@ -55,11 +55,11 @@ from volery.model.fields import (
 )
 from volery.model.floor_plan import FLOOR_PLAN, FloorPlan
 from volery.model.fmu_bodies import FMU, Fmu
-from volery.model.prices import PRICE, Price
-from volery.model.reading import Reading
+from volery.model.prices import PRICE, StatedPrice
+from volery.model.reading import ModelReading
 from volery.model.recorded_inputs import INPUTS, RecordedInput
 from volery.model.resources import POWER
-from volery.model.text import Node, Path
+from volery.model.text import Path, TextNode
 
 MOST_COPIES = 1000
 """The greatest `count` of a vehicle."""
@@ -87,7 +87,7 @@ _ENVIRONMENT: Path = ("environment",)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PlaceSpec:
     """A named point on the ground. ``role`` is free text that components may choose places by.
 
     A vehicle that stands there disarmed gets a full battery after ``battery_swap_ns``, and ``charging_w``
@@ -111,7 +111,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class OriginSpec:
     """The origin of the local frame. The ground is flat at its altitude."""
 
     latitude: Annotated[float, LATITUDE, "WGS-84 latitude."]
@@ -120,7 +120,7 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class PointSpec:
     """A point on the ground: a place, WGS-84 degrees, or metres from either or from the origin."""
 
     place: Annotated[str | None, TEXT, "Name of a place of the environment."] = None
@@ -131,7 +131,7 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class NamedPoint(Point):
+class NamedPoint(PointSpec):
     """A named point on the ground."""
 
     role: Annotated[str, TEXT, "Free text that components may choose places by, such as `hospital`."] = ""
@@ -147,22 +147,22 @@ class NamedPoint(Point):
 
 
 class Geography:
-    """The local frame and the named places of a model that is being read. Use with ``Reading.once``."""
+    """The local frame and the named places of a model that is being read. Use with ``ModelReading.once``."""
 
-    def __init__(self, reading: Reading) -> None:
-        origin = Origin(0.0, 0.0)
+    def __init__(self, reading: ModelReading) -> None:
+        origin = OriginSpec(0.0, 0.0)
         node = reading.root.at((*_ENVIRONMENT, "origin"))
         if node is not None:
-            right, found = read_child(Record(Origin), node, (*_ENVIRONMENT, "origin"), reading)
+            right, found = read_child(Record(OriginSpec), node, (*_ENVIRONMENT, "origin"), reading)
             origin = found if right else origin
         self.reading = reading
         self.frame = LocalFrame(origin.latitude, origin.longitude, origin.amsl)
-        self.places: dict[str, Place] = {}
+        self.places: dict[str, PlaceSpec] = {}
         node = reading.root.at((*_ENVIRONMENT, "places"))
         if node is not None:
             self._read_places(node)
 
-    def _read_places(self, node: Node) -> None:
+    def _read_places(self, node: TextNode) -> None:
         """Read the named places. A place may stand where another one does; those are read last."""
         path = (*_ENVIRONMENT, "places")
         right, points = read_child(MapOf(Record(NamedPoint)), node, path, self.reading)
@@ -174,12 +174,12 @@ class Geography:
             found = self.place((*path, name), name, point)
             if found is not None:
                 at = found.latitude, found.longitude, found.amsl_m, found.east_m, found.north_m
-                self.places[name] = Place(name, *at, point.role, point.battery_swap_ns, point.charging_w)
+                self.places[name] = PlaceSpec(name, *at, point.role, point.battery_swap_ns, point.charging_w)
         self.places = {name: self.places[name] for name in points if name in self.places}
 
-    def place(self, path: Path, name: str, point: Point) -> Place | None:
+    def place(self, path: Path, name: str, point: PointSpec) -> PlaceSpec | None:
         """Return where the *point* at *path* is; None after reporting a problem."""
-        stated = {one.name for one in fields(Point) if getattr(point, one.name) is not None}
+        stated = {one.name for one in fields(PointSpec) if getattr(point, one.name) is not None}
         start, moved = stated - {"east_m", "north_m"}, stated & {"east_m", "north_m"}
         frame = self.frame
         if start == {"place"} and point.place is not None:
@@ -208,7 +208,7 @@ class Geography:
             away = hypot(east, north) / 1000.0
             what = f"{away:.0f} km from the origin; at most {FARTHEST_M / 1000:.0f} km make sense"
             self.reading.problems.add(path, what)
-        return Place(name, latitude, longitude, frame.amsl, east, north)
+        return PlaceSpec(name, latitude, longitude, frame.amsl, east, north)
 
 
 @dataclass(frozen=True)
@@ -216,9 +216,9 @@ class _Resolved(Syntax):
     """What is written as a record ``text`` and becomes what ``resolve`` makes of it."""
 
     text: Syntax
-    resolve: Callable[[Any, Path, Reading], Any]
+    resolve: Callable[[Any, Path, ModelReading], Any]
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         made = self.resolve(self.text.read(node, path, reading), path, reading)
         if made is None:  # its problem has been reported
@@ -230,23 +230,23 @@ class _Resolved(Syntax):
         return self.text.schema(definitions)
 
 
-def _place(point: Point, path: Path, reading: Reading) -> Place | None:
+def _place(point: PointSpec, path: Path, reading: ModelReading) -> PlaceSpec | None:
     return reading.once(Geography).place(path, str(path[-2]), point)
 
 
-def _junction(point: Point, path: Path, reading: Reading) -> Place | None:
+def _junction(point: PointSpec, path: Path, reading: ModelReading) -> PlaceSpec | None:
     return reading.once(Geography).place(path, str(path[-1]), point)
 
 
-PLACE = _Resolved(Shorter(Record(Point), key="place"), _place)
+PLACE = _Resolved(Shorter(Record(PointSpec), key="place"), _place)
 """A point that belongs to something, and is named after it."""
 
 
-def _frame(reading: Reading) -> LocalFrame:
+def _frame(reading: ModelReading) -> LocalFrame:
     return reading.once(Geography).frame
 
 
-def _places(reading: Reading) -> dict[str, Place]:
+def _places(reading: ModelReading) -> dict[str, PlaceSpec]:
     return reading.once(Geography).places
 
 
@@ -261,7 +261,7 @@ class Ways:
     metres.
     """
 
-    nodes: Mapping[str, Place] = field(default_factory=dict)
+    nodes: Mapping[str, PlaceSpec] = field(default_factory=dict)
     edges: tuple[tuple[str, str, float], ...] = ()
     height_m: float = 0.0
 
@@ -272,7 +272,7 @@ class WaysText:
 
     height_m: Annotated[float, DISTANCE, "Height above ground; 0 for roads."] = 0.0
     junctions: Annotated[
-        Mapping[str, Place], MapOf(_Resolved(Record(Point), _junction)), "Points that only join ways."
+        Mapping[str, PlaceSpec], MapOf(_Resolved(Record(PointSpec), _junction)), "Points that only join ways."
     ] = field(default_factory=dict)
     ways: Annotated[
         tuple[tuple[str, ...], ...],
@@ -281,7 +281,7 @@ class WaysText:
     ] = ()
 
 
-def _ways(text: WaysText, path: Path, reading: Reading) -> Ways:
+def _ways(text: WaysText, path: Path, reading: ModelReading) -> Ways:
     known = {**reading.once(Geography).places, **text.junctions}
     edges: list[tuple[str, str, float]] = []
     for number, way in enumerate(text.ways):
@@ -315,14 +315,14 @@ class Prism:
 class PrismText:
     """An upright volume over a polygon of corners, or over a circle."""
 
-    corners: Annotated[tuple[Place, ...], ListOf(PLACE), "Corners of the polygon, in order."] = ()
-    centre: Annotated[Place | None, PLACE, "Centre of the circle."] = None
+    corners: Annotated[tuple[PlaceSpec, ...], ListOf(PLACE), "Corners of the polygon, in order."] = ()
+    centre: Annotated[PlaceSpec | None, PLACE, "Centre of the circle."] = None
     radius_m: Annotated[float | None, DISTANCE, "Radius of the circle."] = None
     floor_m: Annotated[float, DISTANCE, "Lower end, above the origin's ground."] = 0.0
     ceiling_m: Annotated[float | None, DISTANCE, "Upper end; unlimited if it is not given."] = None
 
 
-def _prism(text: PrismText, path: Path, reading: Reading) -> Prism | None:
+def _prism(text: PrismText, path: Path, reading: ModelReading) -> Prism | None:
     ceiling = text.ceiling_m if text.ceiling_m is not None else inf
     if ceiling <= text.floor_m:
         what = f"its ceiling ({ceiling:g} m) is not above its floor ({text.floor_m:g} m)"
@@ -385,7 +385,7 @@ def _parts(
     return (left > 0.0 > right) or (left < 0.0 < right)
 
 
-def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:
+def _circle(centre: PlaceSpec, radius: float) -> tuple[tuple[float, float], ...]:
     """Return the regular polygon around a circle: no part of the circle is outside it."""
     outer = radius / cos(pi / CIRCLE_CORNERS)
     angles = [2.0 * pi * corner / CIRCLE_CORNERS for corner in range(CIRCLE_CORNERS)]
@@ -395,12 +395,12 @@ def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Marker:
+class MarkerSpec:
     """A square marker that lies level on the ground, or on the building at its place, for cameras to see."""
 
     name: str
-    at: Annotated[Place, PLACE, "Where its centre is."]
-    size_m: Annotated[float, Quantity(units.LENGTH, above=0), "Side of its black square."]
+    at: Annotated[PlaceSpec, PLACE, "Where its centre is."]
+    size_m: Annotated[float, QuantityField(units.LENGTH, above=0), "Side of its black square."]
     number: Annotated[int, Key("id"), Whole(least=0), "Its number in the family."]
     family: Annotated[
         str, OneOf(MARKERS), "Family: `36h11` and `16h5` are AprilTags, the others ArUco markers."
@@ -411,9 +411,9 @@ class Marker:
 class _Marker(Record):
     """A marker. Its family must have its number."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
-        made: Marker = super().read(node, path, reading)
+        made: MarkerSpec = super().read(node, path, reading)
         if made.number >= MARKERS[made.family]:
             raise WrongValueError(f"{made.family} has the numbers 0 to {MARKERS[made.family] - 1}")
         return made
@@ -427,7 +427,7 @@ PRISMS = MapOf(_Resolved(Record(PrismText), _prism), values_only=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Wind:
+class WindSpec:
     """Wind: a mean and gusts. Written as its mean speed alone, or as a mapping."""
 
     speed_m_s: Annotated[float, SPEED, "Mean speed."] = 0.0
@@ -436,7 +436,7 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True)
-class Firmware:
+class FirmwareProgram:
     """The program of real firmware that flies a vehicle.
 
     ``program`` is a path, or a name without ``/`` that is searched when a run starts. ``parameters`` are
@@ -476,7 +476,7 @@ class AutopilotText:
 class _Autopilot(Shorter):
     """The name of an autopilot, or a mapping."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> AutopilotText:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> AutopilotText:
         """See ``Syntax``. A problem of a name alone is one at *path*."""
         if isinstance(node.value, dict):
             read: AutopilotText = super().read(node, path, reading)
@@ -487,12 +487,12 @@ class _Autopilot(Shorter):
 _AUTOPILOT = _Autopilot(Record(AutopilotText), key="is")
 
 
-def _project(text: AutopilotText, path: Path, reading: Reading) -> str:
+def _project(text: AutopilotText, path: Path, reading: ModelReading) -> str:
     return text.project
 
 
 @dataclass(frozen=True, slots=True)
-class Vehicle:
+class VehicleSpec:
     """A drone or a rover with its autopilot.
 
     ``firmware`` is the program of real firmware that flies it, None where a simulated one does.
@@ -507,10 +507,10 @@ class Vehicle:
         _Resolved(_AUTOPILOT, _project),
         "What flies it, such as `ardupilot`; a mapping for a program of its real firmware.",
     ]
-    at: Annotated[Place, PLACE, "Where it stands at the start."]
+    at: Annotated[PlaceSpec, PLACE, "Where it stands at the start."]
     heading_deg: Annotated[float, HEADING, "Heading at the start, clockwise from north."] = 0.0
     battery: Annotated[
-        Battery | None, BATTERY, "Its battery; that of its airframe or its kind if it is not given."
+        BatterySpec | None, BATTERY, "Its battery; that of its airframe or its kind if it is not given."
     ] = None
     sensors: Annotated[
         str,
@@ -561,9 +561,9 @@ class Vehicle:
     ] = None
     payload_kg: Annotated[float, LOAD, "Mass that it carries from the start, beside its own."] = 0.0
     price: Annotated[
-        Price | None, PRICE, "Its price without battery and computers; that of its airframe by default."
+        StatedPrice | None, PRICE, "Its price without battery and computers; that of its airframe by default."
     ] = None
-    firmware: Firmware | None = None
+    firmware: FirmwareProgram | None = None
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 
@@ -577,11 +577,11 @@ class Spacing:
 
 
 @dataclass(frozen=True, slots=True)
-class VehicleText(Vehicle):
+class VehicleText(VehicleSpec):
     """A drone or a rover with its autopilot, or a number of them."""
 
     at: Annotated[
-        Place,
+        PlaceSpec,
         ListOf(PLACE, bare=True),
         "Where it stands at the start. With a `count`, a list of points is taken in turn.",
     ]
@@ -595,7 +595,9 @@ class VehicleText(Vehicle):
     ] = Spacing()
 
 
-def _firmware(vehicle: Vehicle, node: Node, path: Path, reading: Reading) -> Firmware | None:
+def _firmware(
+    vehicle: VehicleSpec, node: TextNode, path: Path, reading: ModelReading
+) -> FirmwareProgram | None:
     """Return the program that the `autopilot` of a vehicle states; None for a simulated autopilot."""
     here = (*path, "autopilot")
     text: AutopilotText = _AUTOPILOT.read(node.items["autopilot"], here, reading)
@@ -613,22 +615,22 @@ def _firmware(vehicle: Vehicle, node: Node, path: Path, reading: Reading) -> Fir
             what = f"{text.firmware} has {word}"
             reading.problems.add((*path, key), what)
     program = str(reading.folder / text.firmware) if "/" in text.firmware else text.firmware
-    return Firmware(program, text.parameters, text.repeatable)
+    return FirmwareProgram(program, text.parameters, text.repeatable)
 
 
 class _Vehicle(Record):
     """A vehicle. A number of vehicles has been replaced by its copies when it is read."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Vehicle:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> VehicleSpec:
         """See ``Syntax``. An airframe must be one that the autopilot flies, with the payload."""
-        made: Vehicle = super().read(node, path, reading)
+        made: VehicleSpec = super().read(node, path, reading)
         made = replace(made, firmware=_firmware(made, node, path, reading))
         problems, airframe = reading.problems, made.airframe
-        named = [one if isinstance(one, str) else one.named for one in made.added_sensors]
+        named = [sensor if isinstance(sensor, str) else sensor.named for sensor in made.added_sensors]
         for name in sorted({name for name in named if named.count(name) > 1}):
             what = f"two sensors are called {name!r}; give each a `name` of its own"
             problems.add((*path, "added_sensors"), what, rule=rules.DUPLICATE_NAME)
-        if sum(isinstance(one, Odometry) for one in made.added_sensors) > 1:
+        if sum(isinstance(sensor, Odometry) for sensor in made.added_sensors) > 1:
             problems.add((*path, "added_sensors"), "it has two odometries; only one can move base_link")
         if made.kind != "multirotor" and made.body is not None:
             problems.add((*path, "body"), f"a {made.kind} has no body of its own; only a multirotor has one")
@@ -656,11 +658,11 @@ class _Vehicle(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class CarriedLoad:
     """Something that a gripper takes and carries, such as a parcel."""
 
     name: str
-    at: Annotated[Place, PLACE, "Where it lies at the start."]
+    at: Annotated[PlaceSpec, PLACE, "Where it lies at the start."]
     mass_kg: Annotated[float, MASS, "Its mass, which is part of the vehicle's while it is carried."]
 
 
@@ -691,7 +693,7 @@ class Workload(Orders):
     requesters: int = 1
 
 
-def _workload(text: WorkloadText, path: Path, reading: Reading) -> Workload:
+def _workload(text: WorkloadText, path: Path, reading: ModelReading) -> Workload:
     orders = text.orders
     return Workload(orders.rate_hz, orders.count, orders.first_ns, orders.stream, text.requesters)
 
@@ -700,11 +702,11 @@ def _workload(text: WorkloadText, path: Path, reading: Reading) -> Workload:
 class Environment:
     """The surroundings of the system. The terrain is flat at the origin's altitude."""
 
-    origin: Annotated[LocalFrame, Shared(Record(Origin), _frame), "Origin of the local frame."] = field(
+    origin: Annotated[LocalFrame, Shared(Record(OriginSpec), _frame), "Origin of the local frame."] = field(
         default_factory=lambda: LocalFrame(0.0, 0.0, 0.0)
     )
     places: Annotated[
-        Mapping[str, Place], Shared(MapOf(Record(NamedPoint)), _places), "Named points on the ground."
+        Mapping[str, PlaceSpec], Shared(MapOf(Record(NamedPoint)), _places), "Named points on the ground."
     ] = field(default_factory=dict)
     roads: Annotated[Ways, WAYS, "Roads, for rovers."] = Ways()
     corridors: Annotated[Ways, WAYS, "Air corridors, for drones."] = Ways()
@@ -720,20 +722,24 @@ class Environment:
         "Walls from a picture, beside the buildings; its axes are east and north.",
     ] = None
     markers: Annotated[
-        tuple[Marker, ...], MapOf(_Marker(Marker), values_only=True), "Markers that cameras see, by name."
+        tuple[MarkerSpec, ...],
+        MapOf(_Marker(MarkerSpec), values_only=True),
+        "Markers that cameras see, by name.",
     ] = ()
     light: Annotated[
         str,
         OneOf(LIGHTS),
         "For cameras: an overcast `day`, `dusk` or a lit street, a `night` without lamps.",
     ] = "day"
-    wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
+    wind: Annotated[WindSpec, Shorter(Record(WindSpec), key="speed"), "Wind over all of the world."] = (
+        WindSpec()
+    )
     vehicles: Annotated[
-        tuple[Vehicle, ...], MapOf(_Vehicle(Vehicle), values_only=True), "Drones and rovers, by name."
+        tuple[VehicleSpec, ...], MapOf(_Vehicle(VehicleSpec), values_only=True), "Drones and rovers, by name."
     ] = ()
     loads: Annotated[
-        tuple[Load, ...],
-        MapOf(Record(Load), values_only=True),
+        tuple[CarriedLoad, ...],
+        MapOf(Record(CarriedLoad), values_only=True),
         "What grippers take and carry, by name: a gripper that closes within 2 m takes the nearest.",
     ] = ()
     workload: Annotated[
@@ -758,6 +764,6 @@ class Environment:
         )
         return *self.buildings, *walls
 
-    def places_with(self, role: str) -> tuple[Place, ...]:
+    def places_with(self, role: str) -> tuple[PlaceSpec, ...]:
         """Return the places of one role, in the order of the model."""
         return tuple(place for place in self.places.values() if place.role == role)

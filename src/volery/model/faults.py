@@ -18,7 +18,7 @@ from volery.base import units
 from volery.base.errors import Location
 from volery.base.time import Ns
 from volery.model import rules
-from volery.model.added_sensors import ADDED_SENSORS, AddedSensor, Camera, RangingSensor
+from volery.model.added_sensors import ADDED_SENSORS, AddedSensor, CameraSpec, RangingSensor
 from volery.model.airframes import FRAMES
 from volery.model.fields import (
     ACCELERATION,
@@ -33,8 +33,8 @@ from volery.model.fields import (
     VEHICLE,
     Angle,
     Duration,
+    NameField,
     Record,
-    Reference,
     Schema,
     Syntax,
     Whole,
@@ -42,8 +42,8 @@ from volery.model.fields import (
     expected,
     shown,
 )
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 ONLY_TRIALS = "Only in fault trials: a model cannot state it."
 
@@ -127,7 +127,7 @@ def fault(kind: str, *, trials_only: bool = False) -> Callable[[C], C]:
 # -- the airframe
 
 
-def _multirotors(reading: Reading) -> list[str]:
+def _multirotors(reading: ModelReading) -> list[str]:
     vehicles = reading.root.at(("environment", "vehicles"))
     return [
         name
@@ -139,13 +139,13 @@ def _multirotors(reading: Reading) -> list[str]:
 USUAL_MOTORS = 4
 """Motors of a multirotor without an airframe of the model's own."""
 
-MULTIROTOR = Reference("multirotor", _multirotors)
+MULTIROTOR = NameField("multirotor", _multirotors)
 
 
 class _Motor(Whole):
     """Number of a motor of the vehicle that the fault names."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> int:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> int:
         """See ``Syntax``."""
         motor: int = super().read(node, path, reading)
         fault = reading.root.at(path[:-1])
@@ -220,7 +220,7 @@ class CompassStuck(VehicleFault):
 class _EighthTurns(Angle):
     """An angle by which a sensor can be mounted wrongly about the vertical: eighths of a turn."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> float:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> float:
         """See ``Syntax``."""
         angle = super().read(node, path, reading)
         if angle % 45.0 or not angle:
@@ -273,7 +273,7 @@ class RcLost(VehicleFault):
 # -- sensors that a model adds
 
 
-def _names(sensors: Node | None, kinds: Collection[str] | None) -> list[str]:
+def _names(sensors: TextNode | None, kinds: Collection[str] | None) -> list[str]:
     """Return the names of the sensors in a vehicle's ``added_sensors``, of some kinds only."""
     found = []
     for one in sensors.value if sensors is not None and isinstance(sensors.value, list) else ():
@@ -293,7 +293,7 @@ class _AddedSensor(Syntax):
     noun: str
     kinds: tuple[str, ...] | None = None
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         name: str = TEXT.read(node, path, reading)
         fault = reading.root.at(path[:-1])
@@ -309,7 +309,7 @@ class _AddedSensor(Syntax):
 
 
 SENSOR = _AddedSensor("added sensor")
-CAMERA = _AddedSensor("camera", (Camera.kind,))
+CAMERA = _AddedSensor("camera", (CameraSpec.kind,))
 RANGING = _AddedSensor(
     "sensor of distances",
     tuple(kind for kind, cls in ADDED_SENSORS.items() if issubclass(cls, RangingSensor)),
@@ -334,7 +334,7 @@ def can_happen_to(kind: type[AddedSensorFault], sensor: AddedSensor | str) -> bo
     """Return whether a kind of fault can happen to an added sensor; text names one of another package."""
     if issubclass(kind, RangingFault):
         return isinstance(sensor, RangingSensor)
-    return isinstance(sensor, Camera) or not issubclass(kind, CameraBlack)
+    return isinstance(sensor, CameraSpec) or not issubclass(kind, CameraBlack)
 
 
 @fault("sensor-silent")
@@ -474,7 +474,7 @@ class ProgramKilled(VehicleFault):
 class _AnyFault(Syntax):
     """One of the kinds of faults that a model can state."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         if not isinstance(node.value, dict):
             raise expected("a mapping of keys", node)

@@ -23,9 +23,9 @@ from volery.base.errors import choices, did_you_mean
 from volery.base.time import Ns, S
 from volery.base.units import Kind, QuantityError
 from volery.model import rules
-from volery.model.reading import PROVENANCES, Provenance, Reading
-from volery.model.rules import Rule
-from volery.model.text import Node, Path, Quoted
+from volery.model.reading import PROVENANCES, ModelReading, Provenance
+from volery.model.rules import ModelRule
+from volery.model.text import Path, Quoted, TextNode
 
 Schema = dict[str, Any]
 
@@ -41,17 +41,17 @@ _UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s2|m_s|m2|m|deg_s|deg|coulomb|kg|ohm
 class WrongValueError(ValueError):
     """The written value does not fit its field. An empty message: the problem has been reported already."""
 
-    def __init__(self, message: str, rule: Rule = rules.WRONG_VALUE) -> None:
+    def __init__(self, message: str, rule: ModelRule = rules.WRONG_VALUE) -> None:
         super().__init__(message)
         self.rule = rule
 
 
-def expected(what: str, node: Node) -> WrongValueError:
+def expected(what: str, node: TextNode) -> WrongValueError:
     """Return the error for a *node* that is something else than *what*."""
     return WrongValueError(f"{what} is expected, not {shown(node)}")
 
 
-def shown(node: Node) -> str:
+def shown(node: TextNode) -> str:
     """Return the value of *node* for a message."""
     if isinstance(node.value, dict | list):
         return "a mapping" if isinstance(node.value, dict) else "a list"
@@ -65,7 +65,7 @@ class Syntax(ABC):
     """How a value is written in a model."""
 
     @abstractmethod
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """Return the value of *node*, which stands at *path*.
 
         Raises:
@@ -81,7 +81,7 @@ class Syntax(ABC):
         return value if isinstance(value, bool | int | float) or (value and isinstance(value, str)) else None
 
 
-def read_child(syntax: Syntax, node: Node, path: Path, reading: Reading) -> tuple[bool, Any]:
+def read_child(syntax: Syntax, node: TextNode, path: Path, reading: ModelReading) -> tuple[bool, Any]:
     """Return (True, the value of *node*), or (False, None) after reporting what is wrong with it."""
     try:
         return True, syntax.read(node, path, reading)
@@ -95,10 +95,10 @@ def read_child(syntax: Syntax, node: Node, path: Path, reading: Reading) -> tupl
 # -- scalars
 
 
-class Text(Syntax):
+class TextField(Syntax):
     """Any text."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -116,7 +116,7 @@ class Whole(Syntax):
     least: int | None = None
     most: int | None = None
 
-    def read(self, node: Node, path: Path, reading: Reading) -> int:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> int:
         """See ``Syntax``."""
         value = node.value
         if not isinstance(value, int) or isinstance(value, bool):
@@ -136,7 +136,7 @@ class Whole(Syntax):
 class Number(Syntax):
     """A number without a unit."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> float:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> float:
         """See ``Syntax``."""
         if isinstance(node.value, dict | list) or node.value is None:
             raise expected("a number", node)
@@ -156,7 +156,7 @@ class OneOf(Syntax):
 
     values: tuple[str | int, ...]
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str | int:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str | int:
         """See ``Syntax``."""
         for value in self.values:
             if type(value) is type(node.value) and value == node.value:
@@ -175,7 +175,7 @@ STATED_KEYS = ("value", "provenance", "uncertainty", "source")
 """Keys of a quantity that is written with its provenance."""
 
 
-def _bare_value(node: Node, path: Path, reading: Reading) -> object:
+def _bare_value(node: TextNode, path: Path, reading: ModelReading) -> object:
     """Return what is written for a quantity; record its provenance if it is written as a mapping."""
     if not isinstance(node.value, dict):
         return node.value
@@ -211,7 +211,7 @@ def _quantity_schema() -> Schema:
 
 
 @dataclass(frozen=True)
-class Quantity(Syntax):
+class QuantityField(Syntax):
     """A number with a unit, such as ``3 m/s``, or a mapping of it with its provenance.
 
     The bounds are in the unit of its ``kind``.
@@ -222,7 +222,7 @@ class Quantity(Syntax):
     above: float | None = None
     most: float | None = None
 
-    def read(self, node: Node, path: Path, reading: Reading) -> float:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> float:
         """See ``Syntax``. The value is in the unit of its kind."""
         return self._checked(_bare_value(node, path, reading))
 
@@ -252,10 +252,10 @@ class Quantity(Syntax):
         return f"{value:g} {self.kind.unit}".removesuffix(" 1") if isinstance(value, int | float) else None
 
 
-class Duration(Quantity):
+class Duration(QuantityField):
     """A time, read to whole nanoseconds. The bounds are in seconds."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Ns:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Ns:
         """See ``Syntax``. The value is in nanoseconds."""
         written = _bare_value(node, path, reading)
         self._checked(written)
@@ -273,7 +273,7 @@ class Angle(Syntax):
     most: float
     turn: bool = False
 
-    def read(self, node: Node, path: Path, reading: Reading) -> float:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> float:
         """See ``Syntax``. The value is in degrees."""
         written = node.value
         bare = isinstance(written, int | float) and not isinstance(written, bool)
@@ -295,7 +295,7 @@ class Angle(Syntax):
 class Anything(Syntax):
     """Whatever YAML can state; an unquoted number with a unit becomes a number in SI units."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``. Lists become tuples."""
         return _si(node.plain())
 
@@ -307,7 +307,7 @@ class Anything(Syntax):
 class AsWritten(Anything):
     """Whatever YAML can state, as it is written: what sets another value of the model."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         return node.plain()
 
@@ -328,14 +328,14 @@ def _si(written: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Reference(Syntax):
+class NameField(Syntax):
     """The name of something that ``valid`` lists. ``none`` is a word that stands for no such thing."""
 
     noun: str
-    valid: Callable[[Reading], Iterable[str]]
+    valid: Callable[[ModelReading], Iterable[str]]
     none: str = ""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str | None:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str | None:
         """See ``Syntax``. An unknown name is reported and returned."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -364,7 +364,7 @@ class ListOf(Syntax):
     least: int = 0
     bare: bool = False
 
-    def read(self, node: Node, path: Path, reading: Reading) -> tuple[Any, ...]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> tuple[Any, ...]:
         """See ``Syntax``."""
         if not isinstance(node.value, list):
             if self.bare:
@@ -395,7 +395,7 @@ class MapOf(Syntax):
     free: bool = False
     values_only: bool = False
 
-    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Any] | tuple[Any, ...]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> dict[str, Any] | tuple[Any, ...]:
         """See ``Syntax``."""
         if not isinstance(node.value, dict):
             raise expected("a mapping of keys", node)
@@ -430,14 +430,14 @@ class Shorter(Syntax):
     switch: bool = False
     empty: bool = False
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         if isinstance(node.value, bool) and self.switch:
-            return self.record.read(Node({}, node.where), path, reading) if node.value else None
+            return self.record.read(TextNode({}, node.where), path, reading) if node.value else None
         if node.value is None and self.empty:
-            node = Node({}, node.where)
+            node = TextNode({}, node.where)
         if self.key and not isinstance(node.value, dict) and node.value is not None:
-            node = Node({self.key: node}, node.where)
+            node = TextNode({self.key: node}, node.where)
         return self.record.read(node, path, reading)
 
     def schema(self, definitions: Schema) -> Schema:
@@ -455,9 +455,9 @@ class Shared(Syntax):
     """A mapping written in ``syntax`` that other parts of the model need, too: ``make`` reads it once."""
 
     syntax: Syntax
-    make: Callable[[Reading], Any]
+    make: Callable[[ModelReading], Any]
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         if not isinstance(node.value, dict):
             raise expected("a mapping of keys", node)
@@ -484,7 +484,7 @@ class Others:
 
 
 @dataclass(frozen=True)
-class Entry:
+class DeclaredField:
     """A declared field: where it is written, how, what it means and what it is if it is not stated."""
 
     attribute: str
@@ -500,26 +500,26 @@ class Entry:
         return self.default is MISSING and not self.others
 
 
-def entries(cls: Any) -> tuple[Entry, ...]:
+def entries(cls: Any) -> tuple[DeclaredField, ...]:
     """Return the declared fields of a dataclass."""
     return _entries(cls)
 
 
 @cache
-def _entries(cls: Any) -> tuple[Entry, ...]:
+def _entries(cls: Any) -> tuple[DeclaredField, ...]:
     hints = get_type_hints(cls, include_extras=True)
     found = []
-    for one in fields(cls):
-        hint = hints[one.name]
+    for field in fields(cls):
+        hint = hints[field.name]
         meta = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
         syntax = next((each for each in meta if isinstance(each, Syntax)), None)
         if syntax is None:
             continue
-        key = next((each.name for each in meta if isinstance(each, Key)), _UNIT_SUFFIX.sub("", one.name))
-        default = one.default if one.default_factory is MISSING else one.default_factory()
+        key = next((each.name for each in meta if isinstance(each, Key)), _UNIT_SUFFIX.sub("", field.name))
+        default = field.default if field.default_factory is MISSING else field.default_factory()
         others = any(isinstance(each, Others) for each in meta)
         text = next((each for each in meta if isinstance(each, str)), "")
-        found.append(Entry(one.name, key, syntax, text, default, others))
+        found.append(DeclaredField(field.name, key, syntax, text, default, others))
     return tuple(found)
 
 
@@ -532,11 +532,11 @@ class Record(Syntax):
     """
 
     cls: type[Any]
-    prepare: Callable[[Node, Path, Reading], Node] | None = None
+    prepare: Callable[[TextNode, Path, ModelReading], TextNode] | None = None
     kind: str = ""
     supplied: tuple[str, ...] = ()
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``. ``name`` is the last step of *path*, ``where`` the line of the mapping."""
         if not isinstance(node.value, dict):
             raise expected("a mapping of keys", node)
@@ -546,7 +546,7 @@ class Record(Syntax):
         keys = {one.key: one for one in declared if not one.others}
         others = next((one for one in declared if one.others), None)
         wrong = self._misses_keys(keys, node, path, reading)
-        rest: dict[str, Node] = {}
+        rest: dict[str, TextNode] = {}
         values: dict[str, Any] = {}
         for key, below in node.items.items():
             entry = keys.get(key)
@@ -556,24 +556,32 @@ class Record(Syntax):
                 fits, values[entry.attribute] = read_child(entry.syntax, below, (*path, key), reading)
                 wrong |= not fits
         if others is not None:
-            fits, values[others.attribute] = read_child(others.syntax, Node(rest, node.where), path, reading)
+            fits, values[others.attribute] = read_child(
+                others.syntax, TextNode(rest, node.where), path, reading
+            )
             wrong |= not fits
         elif self._has_unknown_keys(rest, keys, path, reading):
             wrong = True
         if wrong:
             raise WrongValueError("")
-        own = {one.name for one in fields(self.cls)} - {one.attribute for one in declared}
+        own = {field.name for field in fields(self.cls)} - {one.attribute for one in declared}
         filled = {"name": str(path[-1]) if path else "", "where": node.where}
         return self.cls(**values, **{name: value for name, value in filled.items() if name in own})
 
-    def _misses_keys(self, keys: Mapping[str, Entry], node: Node, path: Path, reading: Reading) -> bool:
+    def _misses_keys(
+        self, keys: Mapping[str, DeclaredField], node: TextNode, path: Path, reading: ModelReading
+    ) -> bool:
         missing = [key for key, entry in keys.items() if entry.required and key not in node.items]
         for key in missing:
             reading.problems.add((*path, key), "this key is missing", node.where, rules.MISSING_KEY)
         return bool(missing)
 
     def _has_unknown_keys(
-        self, rest: Mapping[str, Node], keys: Mapping[str, Entry], path: Path, reading: Reading
+        self,
+        rest: Mapping[str, TextNode],
+        keys: Mapping[str, DeclaredField],
+        path: Path,
+        reading: ModelReading,
     ) -> bool:
         known = [*keys, "kind"] if self.kind else list(keys)
         unknown = {key: node for key, node in rest.items() if key not in known}
@@ -613,7 +621,7 @@ class Record(Syntax):
         }
 
 
-def property_schema(entry: Entry, definitions: Schema) -> Schema:
+def property_schema(entry: DeclaredField, definitions: Schema) -> Schema:
     """Return the JSON Schema of a declared field: its syntax, its meaning and its default."""
     made = entry.syntax.schema(definitions)
     hint = made.pop("x-quantity", "")
@@ -632,32 +640,32 @@ def summary(cls: type[Any]) -> str:
     return " ".join(first.split()).replace("``", "`")
 
 
-TEXT = Text()
+TEXT = TextField()
 NUMBER = Number()
 ANYTHING = Anything()
 AS_WRITTEN = AsWritten()
 TIME = Duration(units.TIME, least=0)
 PERIOD = Duration(units.TIME, above=0)
-ENERGY = Quantity(units.ENERGY, least=0)
-FREQUENCY = Quantity(units.FREQUENCY, above=0)
-RATE = Quantity(units.RATE, least=0)
-BANDWIDTH = Quantity(units.BANDWIDTH, above=0)
-DATA_SIZE = Quantity(units.DATA_SIZE, least=0)
-LENGTH = Quantity(units.LENGTH)
-DISTANCE = Quantity(units.LENGTH, least=0)
-SPEED = Quantity(units.SPEED, least=0)
-TURN_RATE = Quantity(units.TURN_RATE, least=0)
-ACCELERATION = Quantity(units.ACCELERATION, least=0)
-CHARGE = Quantity(units.CHARGE, above=0)
-VOLTAGE = Quantity(units.VOLTAGE, above=0)
-LOSS = Quantity(units.RATIO, least=0, most=0.99)
-SHARE = Quantity(units.RATIO, least=0, most=1)
+ENERGY = QuantityField(units.ENERGY, least=0)
+FREQUENCY = QuantityField(units.FREQUENCY, above=0)
+RATE = QuantityField(units.RATE, least=0)
+BANDWIDTH = QuantityField(units.BANDWIDTH, above=0)
+DATA_SIZE = QuantityField(units.DATA_SIZE, least=0)
+LENGTH = QuantityField(units.LENGTH)
+DISTANCE = QuantityField(units.LENGTH, least=0)
+SPEED = QuantityField(units.SPEED, least=0)
+TURN_RATE = QuantityField(units.TURN_RATE, least=0)
+ACCELERATION = QuantityField(units.ACCELERATION, least=0)
+CHARGE = QuantityField(units.CHARGE, above=0)
+VOLTAGE = QuantityField(units.VOLTAGE, above=0)
+LOSS = QuantityField(units.RATIO, least=0, most=0.99)
+SHARE = QuantityField(units.RATIO, least=0, most=1)
 LATITUDE = Angle(90.0)
 LONGITUDE = Angle(180.0)
 HEADING = Angle(360.0, turn=True)
 
-VEHICLE = Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")))
-PROCESSOR = Reference("processor", lambda reading: reading.names(("platform", "processors")))
-NETWORK = Reference("network", lambda reading: reading.names(("platform", "networks")))
-AUTOPILOT = Reference("autopilot", lambda reading: sorted(reading.vocabulary.autopilots))
-PROCESSOR_KIND = Reference("processor in the catalogue", lambda reading: reading.vocabulary.processors)
+VEHICLE = NameField("vehicle", lambda reading: reading.names(("environment", "vehicles")))
+PROCESSOR = NameField("processor", lambda reading: reading.names(("platform", "processors")))
+NETWORK = NameField("network", lambda reading: reading.names(("platform", "networks")))
+AUTOPILOT = NameField("autopilot", lambda reading: sorted(reading.vocabulary.autopilots))
+PROCESSOR_KIND = NameField("processor in the catalogue", lambda reading: reading.vocabulary.processors)

@@ -20,7 +20,7 @@ from volery.base.errors import ModelError
 from volery.model.components import check_inside
 from volery.model.fields import (
     TEXT,
-    Quantity,
+    QuantityField,
     Record,
     Schema,
     Shorter,
@@ -29,8 +29,8 @@ from volery.model.fields import (
     read_child,
 )
 from volery.model.map_file import MAP, MapPicture, parse_map, picture_of
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 MOST_WALLS = 20_000
 
@@ -42,7 +42,7 @@ class FloorPlanText:
     """Walls in a picture, by the YAML file of ROS's map_server. Written as its name, or as a mapping."""
 
     file: Annotated[str, TEXT, "The YAML file: `image`, `resolution`, `origin`, `negate`, `occupied_thresh`."]
-    height_m: Annotated[float, Quantity(units.LENGTH, above=0), "Height of the walls."] = 3.0
+    height_m: Annotated[float, QuantityField(units.LENGTH, above=0), "Height of the walls."] = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class _FloorPlan(Syntax):
 
     written_as = Shorter(Record(FloorPlanText), key="file")
 
-    def read(self, node: Node, path: Path, reading: Reading) -> FloorPlan:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> FloorPlan:
         """See ``Syntax``."""
         stated: FloorPlanText = self.written_as.read(node, path, reading)
         check_inside(reading, path, stated.file)

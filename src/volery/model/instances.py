@@ -35,8 +35,8 @@ from volery.model.fields import (
     WrongValueError,
     expected,
 )
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 APPLICATION: Path = ("application",)
 AROUND: Path = ("environment", "components")
@@ -52,7 +52,7 @@ class TargetKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class ConnectionTarget:
     """The far end of a connection: a provided ``port`` of an instance, a vehicle, or the environment."""
 
     kind: TargetKind
@@ -64,34 +64,34 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
-class Connection:
+class PortConnection:
     """A required port and what it is connected to: exactly one target, or any number if ``many``."""
 
     port: str
     interface: str
-    targets: tuple[Target, ...]
+    targets: tuple[ConnectionTarget, ...]
     many: bool = False
 
 
 # -- connections
 
 
-def component_of(reading: Reading, instance: str) -> Component | None:
+def component_of(reading: ModelReading, instance: str) -> Component | None:
     """Return the component of an instance, None if that is unknown."""
     node = reading.root.at((*APPLICATION, instance, "is")) or reading.root.at((*AROUND, instance, "is"))
     return reading.once(library).get(str(node.value)) if node is not None else None
 
 
-def _is_topic(reading: Reading, interface: str) -> bool:
+def _is_topic(reading: ModelReading, interface: str) -> bool:
     return interface in reading.names(("interfaces",)) and not reading.names(("interfaces", interface))
 
 
-def _kind_of_vehicle(reading: Reading, vehicle: str) -> str:
+def _kind_of_vehicle(reading: ModelReading, vehicle: str) -> str:
     node = reading.root.at((*_VEHICLES, vehicle, "kind"))
     return str(node.value) if node is not None else ""
 
 
-def _candidates(reading: Reading, interface: str) -> str:
+def _candidates(reading: ModelReading, interface: str) -> str:
     """Return what a port of *interface* could be connected to, for a message."""
     if interface == ENVIRONMENT_INTERFACE:
         return f"{interface} is provided by environment"
@@ -115,7 +115,7 @@ TARGETS = ListOf(TEXT, bare=True)
 class _Connections(Syntax):
     """The required ports of an instance by name, and what each is connected to."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Connection]:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> dict[str, PortConnection]:
         """See ``Syntax``. *path* is that of the instance."""
         component = component_of(reading, str(path[-1]))
         if component is None:  # reported where the instance names it
@@ -147,8 +147,8 @@ class _Connections(Syntax):
 
 
 def _connection(
-    reading: Reading, path: Path, port: RequiredPort, texts: tuple[str, ...]
-) -> Connection | None:
+    reading: ModelReading, path: Path, port: RequiredPort, texts: tuple[str, ...]
+) -> PortConnection | None:
     if _is_topic(reading, port.interface):
         what = f"{port.interface} has no operations: it is publish and subscribe, nothing is connected"
         reading.problems.add(path, what, rule=rules.TOPIC_CONNECTED)
@@ -160,19 +160,19 @@ def _connection(
     targets = [_target(reading, path, port.interface, text) for text in texts]
     if any(target is None for target in targets):
         return None
-    return Connection(port.name, port.interface, tuple(filter(None, targets)), port.many)
+    return PortConnection(port.name, port.interface, tuple(filter(None, targets)), port.many)
 
 
-def _target(reading: Reading, path: Path, interface: str, text: str) -> Target | None:
+def _target(reading: ModelReading, path: Path, interface: str, text: str) -> ConnectionTarget | None:
     if interface in VEHICLE_INTERFACES:
         return _vehicle_target(reading, path, interface, text)
     if interface == ENVIRONMENT_INTERFACE:
         known = reading.known(path, text, "provider of Environment", ["environment"])
-        return Target(TargetKind.ENVIRONMENT, text) if known else None
+        return ConnectionTarget(TargetKind.ENVIRONMENT, text) if known else None
     return _instance_target(reading, path, interface, text)
 
 
-def _vehicle_target(reading: Reading, path: Path, interface: str, text: str) -> Target | None:
+def _vehicle_target(reading: ModelReading, path: Path, interface: str, text: str) -> ConnectionTarget | None:
     if not reading.known(path, text, "vehicle", reading.names(_VEHICLES)):
         return None
     kind = _kind_of_vehicle(reading, text)
@@ -180,10 +180,10 @@ def _vehicle_target(reading: Reading, path: Path, interface: str, text: str) -> 
         what = f"{text} is a {kind}; {_candidates(reading, interface)}"
         reading.problems.add(path, what, rule=rules.INTERFACE_MISMATCH)
         return None
-    return Target(TargetKind.VEHICLE, text)
+    return ConnectionTarget(TargetKind.VEHICLE, text)
 
 
-def _instance_target(reading: Reading, path: Path, interface: str, text: str) -> Target | None:
+def _instance_target(reading: ModelReading, path: Path, interface: str, text: str) -> ConnectionTarget | None:
     name, dot, port = text.partition(".")
     if not reading.known(path, name, "component instance", reading.names(AROUND, APPLICATION)):
         return None
@@ -191,7 +191,7 @@ def _instance_target(reading: Reading, path: Path, interface: str, text: str) ->
     if component is None:  # what is wrong with it has been reported
         return None
     if dot and component.provides.get(port) == interface:
-        return Target(TargetKind.INSTANCE, name, port)
+        return ConnectionTarget(TargetKind.INSTANCE, name, port)
     if port in component.provides:
         provided, candidates = component.provides[port], _candidates(reading, interface)
         differs = _difference(reading, interface, provided)
@@ -204,9 +204,11 @@ def _instance_target(reading: Reading, path: Path, interface: str, text: str) ->
     return None
 
 
-def _difference(reading: Reading, required: str, provided: str) -> str:
+def _difference(reading: ModelReading, required: str, provided: str) -> str:
     """Return how the operations of two interfaces differ: methods that are missing, and other types."""
-    wanted, offered = ({} if one is None else one.items for one in _interfaces(reading, required, provided))
+    wanted, offered = (
+        {} if interface is None else interface.items for interface in _interfaces(reading, required, provided)
+    )
     missing = [name for name in wanted if name not in offered]
     other = [
         name for name, node in wanted.items() if name in offered and node.plain() != offered[name].plain()
@@ -216,7 +218,7 @@ def _difference(reading: Reading, required: str, provided: str) -> str:
     return f" ({'; '.join(parts)})" if parts else " (of the same operations)"
 
 
-def _interfaces(reading: Reading, *names: str) -> Iterator[Node | None]:
+def _interfaces(reading: ModelReading, *names: str) -> Iterator[TextNode | None]:
     return (reading.root.at(("interfaces", name)) for name in names)
 
 
@@ -226,7 +228,7 @@ def _interfaces(reading: Reading, *names: str) -> Iterator[Node | None]:
 class _ComponentName(Syntax):
     """The name of a component of the library."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Component:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Component:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -253,7 +255,7 @@ class Instance:
     name: str
     component: Annotated[Component, Key("is"), _ComponentName(), "The component of the library that it is."]
     connections: Annotated[
-        Mapping[str, Connection],
+        Mapping[str, PortConnection],
         Others(),
         _Connections(),
         "Every other key is a required port: `routes: planner.paths`.",
@@ -292,7 +294,7 @@ class Instance:
         return self.processor is None
 
 
-def _with_component(node: Node, path: Path, reading: Reading) -> Node:
+def _with_component(node: TextNode, path: Path, reading: ModelReading) -> TextNode:
     """Add the entries of the component under the instance's own parameters and activity."""
     component = reading.root.at((*LIBRARY, str(node.items["is"].value))) if "is" in node.items else None
     if component is None or component_of(reading, str(path[-1])) is None:
@@ -315,7 +317,7 @@ def _with_component(node: Node, path: Path, reading: Reading) -> Node:
 class _Instance(Record):
     """An instance whose parameters are not called like its ports."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Instance:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Instance:
         """See ``Syntax``."""
         made: Instance = super().read(node, path, reading)
         for name in made.parameters:
@@ -328,7 +330,7 @@ class _Instance(Record):
 INSTANCES = MapOf(_Instance(Instance, prepare=_with_component), values_only=True)
 
 
-def check_cycles(reading: Reading, instances: tuple[Instance, ...]) -> None:
+def check_cycles(reading: ModelReading, instances: tuple[Instance, ...]) -> None:
     """Report calls that lead back to their caller: a call waits for its callee, so they would never end."""
     calls: dict[str, list[Any]] = {
         instance.name: [

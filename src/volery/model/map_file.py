@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from volery.base.errors import ModelError, UsageError
 from volery.model.fields import NUMBER, TEXT, ListOf, OneOf, Record, read_child
-from volery.model.reading import Reading, Vocabulary
-from volery.model.text import Node, Problems, parse
+from volery.model.reading import ModelReading, Vocabulary
+from volery.model.text import Problems, TextNode, parse
 
 MOST_CELLS = 25_000_000
 UNKNOWN_SHADE = 205
@@ -65,7 +65,7 @@ def read_map(file: FilePath) -> MapPicture:
         node = parse_map(file)
         problems = Problems(lambda path: None)
         vocabulary = Vocabulary({}, frozenset())
-        right, stated = read_child(MAP, node, (), Reading(node, problems, vocabulary, file.parent, node))
+        right, stated = read_child(MAP, node, (), ModelReading(node, problems, vocabulary, file.parent, node))
         problems.raise_if_any()
         assert right, "what is wrong has been raised"
         return picture_of(stated, file.parent / stated.image)
@@ -75,7 +75,7 @@ def read_map(file: FilePath) -> MapPicture:
         raise UsageError(f"{file}: {error}") from None
 
 
-def parse_map(file: FilePath) -> Node:
+def parse_map(file: FilePath) -> TextNode:
     """Return the tree of a map's YAML file, without the keys of other programs.
 
     Raises:
@@ -89,7 +89,7 @@ def parse_map(file: FilePath) -> Node:
     except UnicodeDecodeError:
         raise ValueError("this is not YAML; give the YAML file of the picture") from None
     known = {key: below for key, below in tree.items.items() if key in MapText.__annotations__}
-    return Node(known, tree.where)
+    return TextNode(known, tree.where)
 
 
 def picture_of(stated: MapText, picture: FilePath) -> MapPicture:

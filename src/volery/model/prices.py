@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from volery.model.fields import TEXT, Record, Schema, Shorter, Syntax, Whole, expected
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 _AMOUNT = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([A-Z]{3})\s*")
 
@@ -34,12 +34,12 @@ def parse_amount(text: str) -> Amount | None:
 class _Amount(Syntax):
     """An amount with its currency."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Amount:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Amount:
         """See ``Syntax``."""
-        found = parse_amount(node.value) if isinstance(node.value, str) else None
-        if found is None:
+        amount = parse_amount(node.value) if isinstance(node.value, str) else None
+        if amount is None:
             raise expected("an amount with its currency, such as 55 USD or 1200 EUR,", node)
-        return found
+        return amount
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
@@ -47,7 +47,7 @@ class _Amount(Syntax):
 
 
 @dataclass(frozen=True, slots=True)
-class Price:
+class StatedPrice:
     """A price. Written as its amount alone, or as a mapping."""
 
     amount: Annotated[Amount, _Amount(), "Amount and currency."]
@@ -55,4 +55,4 @@ class Price:
     source: Annotated[str, TEXT, "Who asks it; for an estimate, its basis."] = ""
 
 
-PRICE = Shorter(Record(Price), key="amount")
+PRICE = Shorter(Record(StatedPrice), key="amount")

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 from volery.base.errors import Location
 from volery.model import rules
-from volery.model.rules import Rule
-from volery.model.text import Node, Path, Problems, no_such
+from volery.model.rules import ModelRule
+from volery.model.text import Path, Problems, TextNode, no_such
 
 T = TypeVar("T")
 
@@ -107,18 +107,18 @@ class Provenance:
 
 
 @dataclass
-class Reading:
+class ModelReading:
     """The tree that is read, what it is checked against, and the problems found so far.
 
     ``stated`` is the tree before a number of vehicles is replaced by the copies.
     ``provenances`` are those of quantities that state one, by their paths.
     """
 
-    root: Node
+    root: TextNode
     problems: Problems
     vocabulary: Vocabulary
     folder: FilePath
-    stated: Node
+    stated: TextNode
     provenances: dict[Path, Provenance] = field(default_factory=dict)
     _results: dict[Callable[[Any], Any], Any] = field(default_factory=dict)
 
@@ -127,7 +127,7 @@ class Reading:
         found = (self.root.at(section) for section in sections)
         return [name for node in found if node is not None for name in node.items]
 
-    def once(self, make: Callable[[Reading], T]) -> T:
+    def once(self, make: Callable[[ModelReading], T]) -> T:
         """Return what *make* computes from this reading. It is called only the first time."""
         if make not in self._results:
             self._results[make] = make(self)
@@ -139,7 +139,7 @@ class Reading:
         return self.problems.where(path)
 
     def known(
-        self, path: Path, name: str, noun: str, valid: Iterable[str], rule: Rule = rules.UNKNOWN_NAME
+        self, path: Path, name: str, noun: str, valid: Iterable[str], rule: ModelRule = rules.UNKNOWN_NAME
     ) -> bool:
         """Return whether *name* is one of the *valid* names; report a problem at *path* if it is not."""
         names = valid if isinstance(valid, Collection) else list(valid)

@@ -18,15 +18,15 @@ from volery.model.fields import (
     ListOf,
     MapOf,
     OneOf,
-    Quantity,
+    QuantityField,
     Record,
     Schema,
     Shorter,
     Syntax,
     expected,
 )
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import ModelReading
+from volery.model.text import Path, TextNode
 
 STAMPS = ("run", "recorded")
 
@@ -34,7 +34,7 @@ STAMPS = ("run", "recorded")
 class _Recording(Syntax):
     """A recording beside the model: a file, or the folder of a rosbag 2."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> str:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> str:
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
@@ -60,7 +60,9 @@ class RecordedInput:
         ListOf(TEXT, bare=True),
         "Topics that are played; all that can be decoded if not given.",
     ] = ()
-    rate: Annotated[float, Quantity(units.RATIO, above=0), "Recorded seconds in a simulated second."] = 1.0
+    rate: Annotated[float, QuantityField(units.RATIO, above=0), "Recorded seconds in a simulated second."] = (
+        1.0
+    )
     after_ns: Annotated[Ns, TIME, "Recorded time that is skipped at the beginning."] = 0
     delay_ns: Annotated[Ns, TIME, "Simulated time at which it begins: nodes have subscribed by then."] = (
         500 * MS

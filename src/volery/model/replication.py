@@ -21,7 +21,7 @@ from volery.model.document import short_key
 from volery.model.environment import MOST_COPIES
 from volery.model.fields import entries, shown
 from volery.model.instances import Instance
-from volery.model.text import Node, Path, Problems, no_such, written
+from volery.model.text import Path, Problems, TextNode, no_such, written
 
 _VEHICLES: Path = ("environment", "vehicles")
 _PLACES: Path = ("environment", "places")
@@ -51,7 +51,7 @@ _NUMBER: tuple[Path, ...] = (("count",), ("spacing",))
 _SPACING_M = {"east": 3.0, "north": 0.0}
 
 
-def is_counted(root: Node) -> bool:
+def is_counted(root: TextNode) -> bool:
     """Return whether a vehicle has a ``count``."""
     vehicles = root.at(_VEHICLES)
     return any(node.child("count") is not None for node in (vehicles.items.values() if vehicles else ()))
@@ -63,7 +63,7 @@ def is_called_like_copy(name: str, of: Container[str]) -> bool:
     return number.isdigit() and base in of
 
 
-def leads_to_copy(root: Node, path: Path) -> bool:
+def leads_to_copy(root: TextNode, path: Path) -> bool:
     """Return whether *path* leads through an entry that is not there and is called like a copy."""
     node = root
     for step in path:
@@ -74,7 +74,7 @@ def leads_to_copy(root: Node, path: Path) -> bool:
     return False
 
 
-def replicate(root: Node, places: dict[str, Node] | None, problems: Problems) -> Node:
+def replicate(root: TextNode, places: dict[str, TextNode] | None, problems: Problems) -> TextNode:
     """Return the tree with every vehicle that has a ``count`` replaced by its copies.
 
     Args:
@@ -86,27 +86,27 @@ def replicate(root: Node, places: dict[str, Node] | None, problems: Problems) ->
     if not counts:
         return root
     spacings = {name: _spacing(root, name, problems) for name in counts}
-    made = _Replication(root.copy(), problems, counts, spacings)
-    made.find_members()
-    made.make_copies()
-    for name, allocation in made.entries_of("allocations"):
-        made.check_places(name, allocation.items)
+    replication = _Replication(root.copy(), problems, counts, spacings)
+    replication.find_members()
+    replication.make_copies()
+    for name, allocation in replication.entries_of("allocations"):
+        replication.check_places(name, allocation.items)
         if isinstance(allocation.value, dict):
-            allocation.value = made.placed(allocation.items)
-    for _, changed in (*made.entries_of("scenarios"), *made.entries_of("allocations")):
+            allocation.value = replication.placed(allocation.items)
+    for _, changed in (*replication.entries_of("scenarios"), *replication.entries_of("allocations")):
         changes = changed.child("set")
         if changes is not None and isinstance(changes.value, dict):
             changes.value = {
-                path: one for key, one in changes.items.items() for path in made.paths_of_copies(key)
+                path: one for key, one in changes.items.items() for path in replication.paths_of_copies(key)
             }
     if places is not None:
-        replaced = made.placed(places)
+        replaced = replication.placed(places)
         places.clear()
         places.update(replaced)
-    return made.root
+    return replication.root
 
 
-def _counts(root: Node, problems: Problems) -> Iterator[tuple[str, int]]:
+def _counts(root: TextNode, problems: Problems) -> Iterator[tuple[str, int]]:
     vehicles = root.at(_VEHICLES)
     for name, node in vehicles.items.items() if vehicles else ():
         stated = node.child("count")
@@ -120,7 +120,7 @@ def _counts(root: Node, problems: Problems) -> Iterator[tuple[str, int]]:
         yield name, count
 
 
-def _spacing(root: Node, vehicle: str, problems: Problems) -> dict[str, float]:
+def _spacing(root: TextNode, vehicle: str, problems: Problems) -> dict[str, float]:
     path = (*_VEHICLES, vehicle, "spacing")
     node = root.at(path)
     if node is None or node.value is None:
@@ -140,24 +140,24 @@ def _spacing(root: Node, vehicle: str, problems: Problems) -> dict[str, float]:
     return found
 
 
-def _texts(node: Node | None) -> list[str]:
+def _texts(node: TextNode | None) -> list[str]:
     """Return the texts of a value: of one, or of a list."""
     listed = node.value if node is not None and isinstance(node.value, list) else [node]
-    return [one.value for one in listed if isinstance(one, Node) and isinstance(one.value, str)]
+    return [one.value for one in listed if isinstance(one, TextNode) and isinstance(one.value, str)]
 
 
-def _merged(own: Node, copy: Node, path: Path) -> Node:
+def _merged(own: TextNode, copy: TextNode, path: Path) -> TextNode:
     """Return a copy with what is stated for it alone on top."""
     key = short_key(path)
     if isinstance(own.value, dict) and key is not None and not isinstance(copy.value, dict):
-        copy = Node({key: copy}, copy.where)
+        copy = TextNode({key: copy}, copy.where)
     if not isinstance(own.value, dict) or not isinstance(copy.value, dict):
         return own
     below = {
         name: _merged(node, copy.value[name], (*path, name)) if name in copy.value else node
         for name, node in own.items.items()
     }
-    return Node({**copy.value, **below}, copy.where)
+    return TextNode({**copy.value, **below}, copy.where)
 
 
 @dataclass
@@ -167,7 +167,7 @@ class _Replication:
     ``owners`` has the vehicle of each entry that is replicated; ``things`` and ``places`` that of each name.
     """
 
-    root: Node
+    root: TextNode
     problems: Problems
     counts: dict[str, int]
     spacings: dict[str, dict[str, float]]
@@ -201,12 +201,12 @@ class _Replication:
                 )
                 self.problems.add((*section, name), what, node.where, rules.DOUBLY_CONNECTED)
 
-    def entries_of(self, section: str) -> list[tuple[str, Node]]:
+    def entries_of(self, section: str) -> list[tuple[str, TextNode]]:
         """Return the entries of a section."""
         node = self.root.child(section)
         return list(node.items.items()) if node else []
 
-    def _entries(self) -> Iterator[tuple[Path, str, Node]]:
+    def _entries(self) -> Iterator[tuple[Path, str, TextNode]]:
         for section in _NAMING:
             node = self.root.at(section)
             for name, below in node.items.items() if node else ():
@@ -216,11 +216,11 @@ class _Replication:
         self.owners[section, name] = vehicle
         (self.places if section == _PLACES else self.things).setdefault(name, vehicle)
 
-    def _owners_of(self, section: Path, name: str, node: Node) -> Iterator[str]:
+    def _owners_of(self, section: Path, name: str, node: TextNode) -> Iterator[str]:
         """Yield the vehicles that an entry belongs to: one, or none, in a model that is right."""
         stated = node.child("per")
         if stated is not None and section != _VEHICLES:
-            yield from (one for one in _texts(stated) if one in self.counts)
+            yield from (text for text in _texts(stated) if text in self.counts)
         if section in (_VEHICLES, _PLACES):
             texts = _texts(node.child("at" if section == _VEHICLES else "place"))
             yield from (self.places[text] for text in texts if text in self.places)
@@ -244,7 +244,7 @@ class _Replication:
         name = text[1:].partition("/")[0] if text.startswith("/") else text.partition(".")[0]
         return name if name in self.things else None
 
-    def _ports(self, node: Node, *, many: bool) -> list[str]:
+    def _ports(self, node: TextNode, *, many: bool) -> list[str]:
         """Return the connected ports of an instance: those that take one provider, or those of many."""
         kind = node.child("is")
         requires = self.root.at(("components", str(kind.value), "requires")) if kind is not None else None
@@ -271,7 +271,7 @@ class _Replication:
         if suppressed is not None and isinstance(suppressed.value, list):
             suppressed.value = [copy for one in suppressed.value for copy in self._suppressions(one)]
 
-    def _replicated(self, section: Path, stated: dict[str, Node]) -> Iterator[tuple[str, Node]]:
+    def _replicated(self, section: Path, stated: dict[str, TextNode]) -> Iterator[tuple[str, TextNode]]:
         owned = {name: self.owners[section, name] for name in stated if (section, name) in self.owners}
         for name, node in stated.items():
             if name not in owned:
@@ -290,7 +290,7 @@ class _Replication:
                     copy = _merged(self._completed(section, own), copy, (*section, called))
                 yield called, copy
 
-    def _copy(self, section: Path, node: Node, vehicle: str, i: int) -> Node:
+    def _copy(self, section: Path, node: TextNode, vehicle: str, i: int) -> TextNode:
         """Return the *i*-th copy of an entry."""
         if section == ("chains",):
             return self._renamed(node, vehicle, i)
@@ -314,7 +314,7 @@ class _Replication:
                 below["at"] = self._stand(below["at"], vehicle, i)
         return replace(copy, value=below)
 
-    def _completed(self, section: Path, node: Node) -> Node:
+    def _completed(self, section: Path, node: TextNode) -> TextNode:
         """Return an entry with all copies in its lists of names."""
         keys = self._ports(node, many=True) if section in _INSTANCES else []
         if section == ("platform", "networks"):
@@ -322,12 +322,12 @@ class _Replication:
         below = {key: self._all(one) if key in keys else one for key, one in node.items.items()}
         return replace(node, value=below) if isinstance(node.value, dict) else node
 
-    def _all(self, node: Node) -> Node:
+    def _all(self, node: TextNode) -> TextNode:
         """Return a list of names with all copies in the place of what they are made of."""
         listed = node.value if isinstance(node.value, list) else [node]
-        return Node([copy for one in listed for copy in self._copies_of(one, self.things)], node.where)
+        return TextNode([copy for one in listed for copy in self._copies_of(one, self.things)], node.where)
 
-    def _copies_of(self, node: Node, known: dict[str, str]) -> list[Node]:
+    def _copies_of(self, node: TextNode, known: dict[str, str]) -> list[TextNode]:
         """Return the copies of a value that names something of *known*; the value itself if it does not."""
         names = [text if known is self.places else self._name_in(text) for text in _texts(node)]
         vehicle = next((known[name] for name in names if name in known), None)
@@ -335,7 +335,7 @@ class _Replication:
             return [node]
         return [self._renamed(node, vehicle, i, known) for i in range(1, self.counts[vehicle] + 1)]
 
-    def _renamed(self, node: Node, vehicle: str, i: int, known: dict[str, str] | None = None) -> Node:
+    def _renamed(self, node: TextNode, vehicle: str, i: int, known: dict[str, str] | None = None) -> TextNode:
         """Return a value in which the names of what belongs to the vehicle are those of its *i*-th copy."""
         if isinstance(node.value, dict):
             below = {key: self._renamed(one, vehicle, i, known) for key, one in node.items.items()}
@@ -353,12 +353,12 @@ class _Replication:
 
     # -- where the copies stand
 
-    def _stand(self, at: Node, vehicle: str, i: int) -> Node:
+    def _stand(self, at: TextNode, vehicle: str, i: int) -> TextNode:
         """Return where the *i*-th copy stands: at the points of a list in turn, then beside them."""
         points = at.value if isinstance(at.value, list) and at.value else [at]
         return self._shifted(points[(i - 1) % len(points)], vehicle, i, (i - 1) // len(points))
 
-    def _shifted(self, point: Node, vehicle: str, i: int, steps: int) -> Node:
+    def _shifted(self, point: TextNode, vehicle: str, i: int, steps: int) -> TextNode:
         """Return a point, moved by *steps* times the spacing unless each copy has a place of its own."""
         named = point if isinstance(point.value, str) else point.child("place")
         if named is not None and self.places.get(str(named.value)) == vehicle:
@@ -374,12 +374,12 @@ class _Replication:
                 continue
             if step:
                 moved = f"{start + steps * step!r} m"
-                below[key] = Node(moved, stated.where if stated is not None else point.where)
-        return Node(below, point.where)
+                below[key] = TextNode(moved, stated.where if stated is not None else point.where)
+        return TextNode(below, point.where)
 
     # -- allocations and suppressions
 
-    def check_places(self, allocation: str, places: dict[str, Node]) -> None:
+    def check_places(self, allocation: str, places: dict[str, TextNode]) -> None:
         """Report what an allocation places, once, on something of which there are several."""
         for name, node in places.items():
             vehicle = self.things.get(str(node.value))
@@ -390,9 +390,9 @@ class _Replication:
                 )
                 self.problems.add(("allocations", allocation, name), what, node.where, rules.BROKEN_CHAIN)
 
-    def placed(self, places: dict[str, Node]) -> dict[str, Node]:
+    def placed(self, places: dict[str, TextNode]) -> dict[str, TextNode]:
         """Return an allocation in which the copies are placed, each on its own vehicle's computer."""
-        found: dict[str, Node] = {}
+        found: dict[str, TextNode] = {}
         for name, node in places.items():
             vehicle = self.things.get(name)
             if vehicle is None:
@@ -414,7 +414,7 @@ class _Replication:
                 return [written((*section, f"{name}_{i}", *rest)) for i in copies]
         return [text]
 
-    def _suppressions(self, node: Node) -> list[Node]:
+    def _suppressions(self, node: TextNode) -> list[TextNode]:
         at = node.child("at")
         paths = self.paths_of_copies(str(at.value)) if at is not None else []
         if at is None or not paths:

@@ -20,7 +20,7 @@ from volery.model.fields import (
     ListOf,
     MapOf,
     OneOf,
-    Quantity,
+    QuantityField,
     Record,
     Shorter,
     Whole,
@@ -31,7 +31,7 @@ IPC = ("FIFO", "socket", "messageQueue", "sharedMemory", "file")
 """Mechanisms of communication between processes (S3D's InterProcessCommunicationMechanism)."""
 
 DEVICE_KINDS = ("sensor", "actuator", "device")
-POWER = Quantity(units.POWER, least=0)
+POWER = QuantityField(units.POWER, least=0)
 
 
 @dataclass(frozen=True, slots=True)

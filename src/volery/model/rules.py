@@ -16,7 +16,7 @@ Level = Literal["error", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class ModelRule:
     """A rule. A model that breaks one of level ``error`` does not run.
 
     ``suppressible`` is true for rules that a model may suppress with a reason: it can run in spite of them.
@@ -31,10 +31,10 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class BrokenRule:
     """A rule that a model breaks: what is wrong, at which path of the model, in which line."""
 
-    rule: Rule
+    rule: ModelRule
     what: str
     path: str = ""
     where: Location | None = None
@@ -43,18 +43,18 @@ class Finding:
         return f"{self.path}: {self.what}" if self.path else self.what
 
 
-RULES: dict[str, Rule] = {}
+RULES: dict[str, ModelRule] = {}
 """Every rule by its code."""
 
 
-def _rule(code: str, name: str, title: str, remedy: str, level: Level = "error") -> Rule:
-    made = Rule(code, name, level, title, remedy, suppressible=level == "warning")
+def _rule(code: str, name: str, title: str, remedy: str, level: Level = "error") -> ModelRule:
+    rule = ModelRule(code, name, level, title, remedy, suppressible=level == "warning")
     assert code not in RULES, code
-    RULES[code] = made
-    return made
+    RULES[code] = rule
+    return rule
 
 
-def _warning(code: str, name: str, title: str, remedy: str) -> Rule:
+def _warning(code: str, name: str, title: str, remedy: str) -> ModelRule:
     return _rule(code, name, title, remedy, "warning")
 
 
@@ -350,6 +350,6 @@ IDLE_SUPPRESSION = _warning(
 )
 
 
-def find(text: str) -> Rule | None:
+def find(text: str) -> ModelRule | None:
     """Return the rule of a code or a name, None if there is none."""
     return RULES.get(text) or next((one for one in RULES.values() if one.name == text), None)

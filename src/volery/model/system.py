@@ -20,7 +20,7 @@ from volery.model import rules
 from volery.model.components import ROS_LANGUAGES, Component, Interface, check_frequency
 from volery.model.data_types import DataType
 from volery.model.design import DesignParameter, Suppression
-from volery.model.environment import Environment, Vehicle
+from volery.model.environment import Environment, VehicleSpec
 from volery.model.fields import (
     BANDWIDTH,
     DATA_SIZE,
@@ -35,17 +35,17 @@ from volery.model.fields import (
     Key,
     ListOf,
     MapOf,
+    NameField,
     OneOf,
     Record,
-    Reference,
     Schema,
     Syntax,
     Whole,
     WrongValueError,
 )
 from volery.model.instances import Instance, component_of
-from volery.model.prices import PRICE, Price
-from volery.model.reading import NOTE_PREFIX, NOTE_TIMES, Observable, Provenance, Reading, split_note
+from volery.model.prices import PRICE, StatedPrice
+from volery.model.reading import NOTE_PREFIX, NOTE_TIMES, ModelReading, Observable, Provenance, split_note
 from volery.model.resources import (
     CACHES,
     POWER_STATES,
@@ -55,8 +55,8 @@ from volery.model.resources import (
     OperatingSystem,
     PowerState,
 )
-from volery.model.rules import Finding
-from volery.model.text import Node, Path
+from volery.model.rules import BrokenRule
+from volery.model.text import Path, TextNode
 
 SCHEDULERS = ("fixed-priority", "round-robin", "fifo", "edf")
 """Fixed-priority is preemptive: a greater number is more urgent, equals go in order of arrival."""
@@ -69,7 +69,7 @@ MAINS = "mains"
 
 
 @dataclass(frozen=True, slots=True)
-class Processor:
+class ProcessorSpec:
     """A computer. ``operating_system`` is what is allocated to it, None where the model states none.
 
     ``powered_by`` names the vehicle whose battery it drains, None for mains. ``quantum_ns`` is None for the
@@ -90,7 +90,7 @@ class Processor:
     )
     powered_by: Annotated[
         str | None,
-        Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")), none=MAINS),
+        NameField("vehicle", lambda reading: reading.names(("environment", "vehicles")), none=MAINS),
         "The vehicle whose battery it drains; by default, the one that carries it.",
     ] = None
     context_switch_ns: Annotated[Ns, TIME, "Time that a core needs to go on with another task."] = 0
@@ -100,7 +100,7 @@ class Processor:
     power_states: Annotated[
         Mapping[str, PowerState], POWER_STATES, "States it can be in, and what it draws in each."
     ] = field(default_factory=dict)
-    price: Annotated[Price | None, PRICE, "Its price; by default that of the catalogue."] = None
+    price: Annotated[StatedPrice | None, PRICE, "Its price; by default that of the catalogue."] = None
     operating_system: str | None = None
     where: Location | None = field(default=None, compare=False)
 
@@ -110,12 +110,12 @@ class Processor:
         return self.frequency_hz / 1e6
 
 
-def _with_kind(node: Node, path: Path, reading: Reading) -> Node:
+def _with_kind(node: TextNode, path: Path, reading: ModelReading) -> TextNode:
     """Add the number of cores from the catalogue, and the vehicle that carries the computer as its power."""
     added = dict(node.items)
     kind = reading.vocabulary.processors.get(str(added["is"].value)) if "is" in added else None
     if kind is not None and ("cores" not in added or added["cores"].value is None):
-        added["cores"] = Node(kind.cores, node.where)
+        added["cores"] = TextNode(kind.cores, node.where)
     if "carried_by" in added and ("powered_by" not in added or added["powered_by"].value is None):
         reading.problems.copied((*path, "powered_by"), (*path, "carried_by"))
         added["powered_by"] = added["carried_by"]
@@ -125,9 +125,9 @@ def _with_kind(node: Node, path: Path, reading: Reading) -> Node:
 class _Processor(Record):
     """A computer within the limits of its kind."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Processor:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> ProcessorSpec:
         """See ``Syntax``. A frequency between two that can be set is a warning."""
-        made: Processor = super().read(node, path, reading)
+        made: ProcessorSpec = super().read(node, path, reading)
         check_frequency(reading, path, made.kind, made.frequency_hz)
         kind = reading.vocabulary.processors.get(made.kind)
         if kind is None:
@@ -148,7 +148,7 @@ class _Processor(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Network:
+class NetworkSpec:
     """A network that joins processors."""
 
     name: str
@@ -160,7 +160,7 @@ class Network:
         None
     )
     price: Annotated[
-        Price | None, PRICE, "Price of the radio at one end; by default that of the catalogue."
+        StatedPrice | None, PRICE, "Price of the radio at one end; by default that of the catalogue."
     ] = None
     where: Location | None = field(default=None, compare=False)
 
@@ -168,9 +168,9 @@ class Network:
 class _Network(Record):
     """A network that joins each processor once."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Network:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> NetworkSpec:
         """See ``Syntax``."""
-        made: Network = super().read(node, path, reading)
+        made: NetworkSpec = super().read(node, path, reading)
         if len(set(made.between)) != len(made.between):
             reading.problems.add(
                 (*path, "between"), "a processor stands here twice", rule=rules.DUPLICATE_NAME
@@ -178,8 +178,8 @@ class _Network(Record):
         return made
 
 
-PROCESSORS = MapOf(_Processor(Processor, prepare=_with_kind), values_only=True)
-NETWORKS = MapOf(_Network(Network), values_only=True)
+PROCESSORS = MapOf(_Processor(ProcessorSpec, prepare=_with_kind), values_only=True)
+NETWORKS = MapOf(_Network(NetworkSpec), values_only=True)
 
 
 # -- requirements
@@ -199,7 +199,7 @@ class _Chain(Syntax):
 
     topics = ListOf(TEXT, least=1)
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Chain:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Chain:
         """See ``Syntax``."""
         topics = self.topics.read(node, path, reading)
         for place, topic in enumerate(topics):
@@ -216,7 +216,7 @@ class _Chain(Syntax):
 class _BoundValue(Syntax):
     """A number in the unit of the observed quantity; it is read when the quantity is known."""
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> Any:
         """See ``Syntax``."""
         if isinstance(node.value, dict | list | bool) or node.value is None:
             raise WrongValueError("a number, with the unit of the observed quantity, is expected")
@@ -238,7 +238,7 @@ class BoundText:
 
 
 @dataclass(frozen=True, slots=True)
-class Bound:
+class RequiredBound:
     """A requirement: a bound on an observed quantity.
 
     ``relation`` is ``max`` or ``min``; both include the bound. ``observe`` is ``<subject>.<quantity>``;
@@ -263,7 +263,7 @@ class _Bound(Syntax):
 
     text = Record(BoundText)
 
-    def read(self, node: Node, path: Path, reading: Reading) -> Bound:
+    def read(self, node: TextNode, path: Path, reading: ModelReading) -> RequiredBound:
         """See ``Syntax``."""
         text: BoundText = self.text.read(node, path, reading)
         observable = _observable(reading, (*path, "observe"), text.observe)
@@ -280,14 +280,16 @@ class _Bound(Syntax):
             what = f"{text.observe} is {measured}: {error}"
             reading.problems.add((*path, relation), what, rule=rules.WRONG_QUANTITY)
             raise WrongValueError("") from None
-        return Bound(str(path[-1]), text.observe, relation, number, unit, text.description, node.where)
+        return RequiredBound(
+            str(path[-1]), text.observe, relation, number, unit, text.description, node.where
+        )
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         return self.text.schema(definitions)
 
 
-def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
+def _observable(reading: ModelReading, path: Path, text: str) -> Observable | None:
     if text.partition(".")[0] == NOTE_PREFIX:
         return _noted(reading, path, text)
     subject, _, quantity = text.rpartition(".")
@@ -308,14 +310,18 @@ def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
         kind = kinds[subject]
     else:
         return None
-    offered = {one.quantity: one for one in reading.vocabulary.observables if one.subject == kind}
+    offered = {
+        observable.quantity: observable
+        for observable in reading.vocabulary.observables
+        if observable.subject == kind
+    }
     noun = f"quantity of a {kind}"
     return (
         offered[quantity] if reading.known(path, quantity, noun, offered, rules.UNKNOWN_OBSERVABLE) else None
     )
 
 
-def _is_operation(reading: Reading, path: Path, instance: str, operation: str) -> bool:
+def _is_operation(reading: ModelReading, path: Path, instance: str, operation: str) -> bool:
     """Return whether an instance provides an operation; the services of a ROS node are known when it runs."""
     component = component_of(reading, instance)
     if component is None or component.language in ROS_LANGUAGES:
@@ -327,7 +333,7 @@ def _is_operation(reading: Reading, path: Path, instance: str, operation: str) -
     return reading.known(path, operation, noun, provided, rules.UNKNOWN_OBSERVABLE)
 
 
-def _noted(reading: Reading, path: Path, text: str) -> Observable | None:
+def _noted(reading: ModelReading, path: Path, text: str) -> Observable | None:
     """Return what is observed of the notes of one state; the words are the application's."""
     words = split_note(text)
     if words is not None:
@@ -349,14 +355,14 @@ class RunLimits:
     """How long a run lasts."""
 
     duration_ns: Annotated[Ns, PERIOD, "Longest simulated time."] = 15 * MINUTE
-    until: Annotated[Bound | None, BOUND, "Bound that ends the run as soon as it holds."] = None
+    until: Annotated[RequiredBound | None, BOUND, "Bound that ends the run as soon as it holds."] = None
 
 
 # -- the system
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ModelFile:
     """A file that the model was read from, for the trace. ``name`` is relative to the model's folder."""
 
     name: str
@@ -377,11 +383,11 @@ class System:
 
     name: str
     instances: tuple[Instance, ...]
-    processors: tuple[Processor, ...] = ()
-    networks: tuple[Network, ...] = ()
+    processors: tuple[ProcessorSpec, ...] = ()
+    networks: tuple[NetworkSpec, ...] = ()
     environment: Environment = field(default_factory=Environment)
     chains: tuple[Chain, ...] = ()
-    requirements: tuple[Bound, ...] = ()
+    requirements: tuple[RequiredBound, ...] = ()
     memory_spaces: tuple[MemorySpace, ...] = ()
     operating_systems: tuple[OperatingSystem, ...] = ()
     devices: tuple[Device, ...] = ()
@@ -398,13 +404,13 @@ class System:
     allocations: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
     overrides: tuple[str, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[ModelFile, ...] = ()
     folder: FilePath = field(default=FilePath(), compare=False)
     catalogues: tuple[FilePath, ...] = ()
-    warnings: tuple[Finding, ...] = ()
+    warnings: tuple[BrokenRule, ...] = ()
 
     @property
-    def vehicles(self) -> tuple[Vehicle, ...]:
+    def vehicles(self) -> tuple[VehicleSpec, ...]:
         """The environment's vehicles, in the order of the model."""
         return self.environment.vehicles
 
@@ -416,7 +422,7 @@ class System:
         """
         return _named(self.instances, name, "component instance")
 
-    def processor(self, name: str) -> Processor:
+    def processor(self, name: str) -> ProcessorSpec:
         """Return the processor called *name*.
 
         Raises:
@@ -424,7 +430,7 @@ class System:
         """
         return _named(self.processors, name, "processor")
 
-    def vehicle(self, name: str) -> Vehicle:
+    def vehicle(self, name: str) -> VehicleSpec:
         """Return the vehicle called *name*.
 
         Raises:
@@ -432,7 +438,7 @@ class System:
         """
         return _named(self.vehicles, name, "vehicle")
 
-    def network_between(self, one: str, other: str) -> Network | None:
+    def network_between(self, one: str, other: str) -> NetworkSpec | None:
         """Return the first network of the model that joins two processors, None if none does."""
         return next((net for net in self.networks if one in net.between and other in net.between), None)
 
@@ -454,7 +460,7 @@ class System:
         return interface in self.interfaces and self.interfaces[interface].is_publish_subscribe
 
 
-Thing = TypeVar("Thing", Instance, Processor, Vehicle)
+Thing = TypeVar("Thing", Instance, ProcessorSpec, VehicleSpec)
 
 
 def _named(things: tuple[Thing, ...], name: str, noun: str) -> Thing:

@@ -21,13 +21,13 @@ from volery.model.assembly import (
     model_file,
 )
 from volery.model.builder import ModelBuilder
-from volery.model.components import Figure
+from volery.model.components import StatedFigure
 from volery.model.document import DOCUMENT, Document
-from volery.model.environment import Environment, Vehicle
+from volery.model.environment import Environment, VehicleSpec
 from volery.model.fields import TEXT, ListOf, read_child
 from volery.model.instances import Instance, TargetKind, check_cycles
-from volery.model.reading import NOTE_PREFIX, Reading, Vocabulary
-from volery.model.system import Network, System
+from volery.model.reading import NOTE_PREFIX, ModelReading, Vocabulary
+from volery.model.system import NetworkSpec, System
 from volery.model.text import CollectedModelError, Path, written
 
 FIDELITIES = ("times", "code", "firmware", "hardware")
@@ -49,7 +49,7 @@ def check_code(system: System) -> None:
 
 def _unwritten(system: System) -> Iterator[ModelError]:
     stated = {finding.path: finding.where for finding in system.warnings}
-    for component in {one.component.name: one.component for one in system.instances}.values():
+    for component in {instance.component.name: instance.component for instance in system.instances}.values():
         if component.path and not system.file_of(component).exists():
             what = (
                 f"there is no file {component.path!r}: a run needs its code. Write it, or remove `path` to "
@@ -85,7 +85,9 @@ def _missing_figures(system: System, instance: Instance) -> Iterator[ModelError]
         yield from _missing(instance, "activation", component.activation, kind)
 
 
-def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: str) -> Iterator[ModelError]:
+def _missing(
+    instance: Instance, what: str, figures: tuple[StatedFigure, ...], kind: str
+) -> Iterator[ModelError]:
     if any(figure.processor == kind for figure in figures):
         return
     stated = f" (there is one at {choices({figure.processor for figure in figures})})" if figures else ""
@@ -126,7 +128,7 @@ def load(
     source = model if isinstance(model, ModelBuilder) else model_file(model)
     folder = source.folder if isinstance(source, ModelBuilder) else source.parent
     made, problems = assemble(source, selection)
-    reading = Reading(made.root, problems, vocabulary, folder, made.stated)
+    reading = ModelReading(made.root, problems, vocabulary, folder, made.stated)
     catalogues = _read_catalogues(reading)
     _, document = read_child(DOCUMENT, made.root, (), reading)
     if document is None:
@@ -136,7 +138,7 @@ def load(
     return replace(system, overrides=options, catalogues=catalogues, warnings=problems.warnings)
 
 
-def _read_catalogues(reading: Reading) -> tuple[FilePath, ...]:
+def _read_catalogues(reading: ModelReading) -> tuple[FilePath, ...]:
     """Add the processors of the model's own catalogues to the vocabulary; return the files."""
     path: Path = ("platform", "catalogues")
     node = reading.root.at(path)
@@ -154,7 +156,7 @@ def _read_catalogues(reading: Reading) -> tuple[FilePath, ...]:
     return files
 
 
-def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
+def _resolve(reading: ModelReading, document: Document, made: Assembly) -> System:
     """Put the sections of a document together, and check what concerns several of them."""
     _check_names(reading)
     _check_allocations(reading)
@@ -168,9 +170,11 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
             )
             reading.problems.add(path, f"{which} does not say where {name} runs", rule=rules.UNALLOCATED)
     surroundings = document.environment
-    spaces = {one.name for one in document.memory_spaces}
+    spaces = {space.name for space in document.memory_spaces}
     systems = {
-        places[one.name]: one.name for one in document.platform.operating_systems if one.name in places
+        places[system.name]: system.name
+        for system in document.platform.operating_systems
+        if system.name in places
     }
     instances = (
         *(
@@ -184,11 +188,11 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
         *surroundings.components,
     )
     vehicles = [
-        replace(one, processor=places.get(one.name) or _carried_processor(reading, one))
-        for one in surroundings.vehicles
+        replace(vehicle, processor=places.get(vehicle.name) or _carried_processor(reading, vehicle))
+        for vehicle in surroundings.vehicles
     ]
     environment = Environment(
-        **{one.name: getattr(surroundings, one.name) for one in fields(Environment)}
+        **{field.name: getattr(surroundings, field.name) for field in fields(Environment)}
         | {"vehicles": tuple(vehicles)}
     )
     check_cycles(reading, instances)
@@ -197,7 +201,8 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
         name=document.name,
         instances=instances,
         processors=tuple(
-            replace(one, operating_system=systems.get(one.name)) for one in document.platform.processors
+            replace(processor, operating_system=systems.get(processor.name))
+            for processor in document.platform.processors
         ),
         networks=document.platform.networks,
         environment=environment,
@@ -223,7 +228,7 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
     )
 
 
-def _processors_of(reading: Reading, stated: dict[str, str], allocation: str) -> dict[str, str]:
+def _processors_of(reading: ModelReading, stated: dict[str, str], allocation: str) -> dict[str, str]:
     """Return the processor that each allocated thing leads to; report those that lead to none."""
     processors = set(reading.names(("platform", "processors")))
     heights = dict.fromkeys(reading.names(("memory_spaces",)), 1)
@@ -250,7 +255,7 @@ def _processors_of(reading: Reading, stated: dict[str, str], allocation: str) ->
     return found
 
 
-def _check_names(reading: Reading) -> None:
+def _check_names(reading: ModelReading) -> None:
     """Report names that two things share: observables and allocations refer to things by their name."""
     taken: dict[str, str] = dict.fromkeys(RESERVED, "a word of the model")
     sections: tuple[tuple[Path, str], ...] = (
@@ -273,7 +278,7 @@ def _check_names(reading: Reading) -> None:
             taken.setdefault(name, what)
 
 
-def _check_allocations(reading: Reading) -> None:
+def _check_allocations(reading: ModelReading) -> None:
     """Report allocations, chosen or not, of instances and vehicles that do not exist."""
     sections: tuple[Path, ...] = (("application",), ("environment", "vehicles"), ("memory_spaces",))
     placeable = reading.names(*sections, ("platform", "operating_systems"))
@@ -287,7 +292,7 @@ def _check_allocations(reading: Reading) -> None:
                 reading.known(path, name, "component instance or vehicle", placeable)
 
 
-def _carried_processor(reading: Reading, vehicle: Vehicle) -> str | None:
+def _carried_processor(reading: ModelReading, vehicle: VehicleSpec) -> str | None:
     """Return the one computer that a vehicle carries: its node runs there unless it is allocated."""
     processors = reading.root.at(("platform", "processors"))
     carried = [
@@ -305,7 +310,9 @@ def _carried_processor(reading: Reading, vehicle: Vehicle) -> str | None:
     return carried[0] if len(carried) == 1 else None
 
 
-def _check_reach(reading: Reading, instances: tuple[Instance, ...], networks: tuple[Network, ...]) -> None:
+def _check_reach(
+    reading: ModelReading, instances: tuple[Instance, ...], networks: tuple[NetworkSpec, ...]
+) -> None:
     """Report calls between two computers that no network joins. The environment is everywhere."""
     processor_of = {instance.name: instance.processor for instance in instances}
     for instance in instances:

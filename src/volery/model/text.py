@@ -1,6 +1,6 @@
 """The text of a model: YAML as a tree with source lines, and the problems found in it.
 
-A ``Node`` is a scalar, a mapping or a list. Nodes that are merged into a tree later (a world file, a
+A ``TextNode`` is a scalar, a mapping or a list. Nodes that are merged into a tree later (a world file, a
 scenario, an option) keep their own locations. YAML 1.2, so ``on`` and ``yes`` are text. Keys are text, and
 unique. Problems are collected, so that all of them are reported at once.
 """
@@ -17,7 +17,7 @@ from typing import Any
 from volery.base.errors import Location, ModelError, choices, did_you_mean
 from volery.base.installed import require_extra
 from volery.model import rules
-from volery.model.rules import Finding, Rule
+from volery.model.rules import BrokenRule, ModelRule
 
 try:
     from ruamel.yaml import YAML
@@ -59,14 +59,14 @@ class Problems:
     def __init__(self, locate: Locate) -> None:
         self._locate = locate
         self._found: dict[str, ModelError] = {}
-        self._warnings: dict[Finding, None] = {}  # an ordered set
+        self._warnings: dict[BrokenRule, None] = {}  # an ordered set
         self._origins: dict[Path, Path] = {}
 
     def __bool__(self) -> bool:
         return bool(self._found)
 
     def add(
-        self, path: Path, what: str, where: Location | None = None, rule: Rule = rules.WRONG_VALUE
+        self, path: Path, what: str, where: Location | None = None, rule: ModelRule = rules.WRONG_VALUE
     ) -> None:
         """Report that *what* is wrong at *path*, which stands at *where*; the same problem counts once."""
         path = self._origin(path)
@@ -94,13 +94,13 @@ class Problems:
         """Report an unknown *name* at *path*; *valid* are the known names."""
         self.add(path, no_such(name, noun, valid), rule=rules.UNKNOWN_NAME)
 
-    def warn(self, path: Path, what: str, rule: Rule) -> None:
+    def warn(self, path: Path, what: str, rule: ModelRule) -> None:
         """Report that *what* is doubtful at *path*; the model is valid nevertheless."""
         path = self._origin(path)
-        self._warnings[Finding(rule, what, written(path), self._locate(path))] = None
+        self._warnings[BrokenRule(rule, what, written(path), self._locate(path))] = None
 
     @property
-    def warnings(self) -> tuple[Finding, ...]:
+    def warnings(self) -> tuple[BrokenRule, ...]:
         """The warnings, once each."""
         return tuple(self._warnings)
 
@@ -137,37 +137,37 @@ Scalar = str | int | float | bool | None
 
 
 @dataclass
-class Node:
+class TextNode:
     """A value of a model with its location: for an entry of a mapping, the line of its key.
 
     ``quoted`` is true for a text in quotation marks: it is meant as text even if it looks like a quantity.
     """
 
-    value: Scalar | dict[str, Node] | list[Node]
+    value: Scalar | dict[str, TextNode] | list[TextNode]
     where: Location
     quoted: bool = False
 
     @property
-    def items(self) -> dict[str, Node]:
+    def items(self) -> dict[str, TextNode]:
         """The entries of a mapping; empty for anything else."""
         return self.value if isinstance(self.value, dict) else {}
 
-    def child(self, step: str | int) -> Node | None:
+    def child(self, step: str | int) -> TextNode | None:
         """Return the entry or the list item *step*, None if there is none."""
         if isinstance(self.value, list) and str(step).isdigit() and int(step) < len(self.value):
             return self.value[int(step)]
         return self.items.get(str(step))
 
-    def at(self, path: Path) -> Node | None:
+    def at(self, path: Path) -> TextNode | None:
         """Return the node at *path*, None if there is none."""
-        node: Node | None = self
+        node: TextNode | None = self
         for step in path:
             node = node.child(step) if node else None
         return node
 
     def locate(self, path: Path) -> Location | None:
         """Return the location of *path*, or of its deepest part that exists."""
-        node: Node = self
+        node: TextNode = self
         for step in path:
             below = node.child(step)
             if below is None:
@@ -183,28 +183,28 @@ class Node:
             return [node.plain() for node in self.value]
         return Quoted(self.value) if self.quoted else self.value
 
-    def copy(self) -> Node:
+    def copy(self) -> TextNode:
         """Return a deep copy."""
         if isinstance(self.value, dict):
-            return Node({key: node.copy() for key, node in self.value.items()}, self.where)
+            return TextNode({key: node.copy() for key, node in self.value.items()}, self.where)
         if isinstance(self.value, list):
-            return Node([node.copy() for node in self.value], self.where)
-        return Node(self.value, self.where, self.quoted)
+            return TextNode([node.copy() for node in self.value], self.where)
+        return TextNode(self.value, self.where, self.quoted)
 
-    def moved(self, where: Location) -> Node:
+    def moved(self, where: Location) -> TextNode:
         """Return a copy in which every node stands at *where*."""
         if isinstance(self.value, dict):
-            return Node({key: node.moved(where) for key, node in self.value.items()}, where)
+            return TextNode({key: node.moved(where) for key, node in self.value.items()}, where)
         if isinstance(self.value, list):
-            return Node([node.moved(where) for node in self.value], where)
-        return Node(self.value, where, self.quoted)
+            return TextNode([node.moved(where) for node in self.value], where)
+        return TextNode(self.value, where, self.quoted)
 
 
-def stated_texts(root: Node, key: str) -> list[str]:
+def stated_texts(root: TextNode, key: str) -> list[str]:
     """Return the texts of a key of the model: one text, or a list of them."""
     node = root.child(key)
     listed = node.value if node is not None and isinstance(node.value, list) else [node] if node else []
-    return [one.value for one in listed if isinstance(one, Node) and isinstance(one.value, str)]
+    return [one.value for one in listed if isinstance(one, TextNode) and isinstance(one.value, str)]
 
 
 def is_inside(file: FilePath, folders: Iterable[FilePath]) -> bool:
@@ -224,7 +224,7 @@ class Quoted(str):
     __slots__ = ()
 
 
-def parse(text: str, name: str, *, merges: bool = False) -> Node:
+def parse(text: str, name: str, *, merges: bool = False) -> TextNode:
     """Return the tree of a YAML text. *name* is the name of the file in messages.
 
     A key that is there twice is an error, unless it *merges*: then both mappings hold, as in files of ROS.
@@ -253,10 +253,10 @@ def parse(text: str, name: str, *, merges: bool = False) -> Node:
     return _Reading(name, yaml, merges).node(root, ())
 
 
-def parse_value(text: str, where: Location) -> Node:
+def parse_value(text: str, where: Location) -> TextNode:
     """Return the tree of an option's value, every node of which stands at *where*."""
     if not text.strip():
-        return Node(None, where)
+        return TextNode(None, where)
     try:
         return parse(text, where.file).moved(where)
     except ModelError as error:
@@ -273,7 +273,7 @@ class _Reading:
     count: int = 0
     open: list[int] = field(default_factory=list)
 
-    def node(self, raw: Any, path: Path) -> Node:
+    def node(self, raw: Any, path: Path) -> TextNode:
         """Return the tree below *raw*."""
         where = Location(self.name, raw.start_mark.line + 1)
         self.count += 1
@@ -281,11 +281,11 @@ class _Reading:
             what = f"more than {MOST_NODES} values; is it a model?"
             raise ModelError(what, _dotted(path), where, rules.TOO_LARGE.code)
         if isinstance(raw, ScalarNode):
-            return Node(self._scalar(raw, path, where), where, quoted=raw.style in ("'", '"'))
+            return TextNode(self._scalar(raw, path, where), where, quoted=raw.style in ("'", '"'))
         if id(raw) in self.open:
             raise ModelError("an alias that contains itself", _dotted(path), where, rules.TOO_LARGE.code)
         self.open.append(id(raw))
-        value: dict[str, Node] | list[Node]
+        value: dict[str, TextNode] | list[TextNode]
         if isinstance(raw, SequenceNode):
             value = [self.node(item, (*path, position)) for position, item in enumerate(raw.value)]
         else:
@@ -293,9 +293,9 @@ class _Reading:
             for name, below in self._entries(raw, path):
                 value[name] = _merged(value[name], below) if name in value else below
         self.open.pop()
-        return Node(value, where)
+        return TextNode(value, where)
 
-    def _entries(self, raw: MappingNode, path: Path) -> Iterator[tuple[str, Node]]:
+    def _entries(self, raw: MappingNode, path: Path) -> Iterator[tuple[str, TextNode]]:
         lines: dict[str, int] = {}
         for key, value in raw.value:
             where = Location(self.name, key.start_mark.line + 1)
@@ -311,7 +311,7 @@ class _Reading:
                 raise ModelError(what, here, where, rules.DUPLICATE_KEY.code)
             lines[name] = where.line
             node = self.node(value, (*path, name))
-            yield name, Node(node.value, where, node.quoted)
+            yield name, TextNode(node.value, where, node.quoted)
 
     def _scalar(self, raw: ScalarNode, path: Path, where: Location) -> Scalar:
         kind = str(raw.tag or "").rpartition(":")[2]
@@ -328,14 +328,14 @@ class _Reading:
         return value
 
 
-def _merged(one: Node, other: Node) -> Node:
+def _merged(one: TextNode, other: TextNode) -> TextNode:
     """Return two mappings in one, where the *other* wins; of anything else the other."""
     if not isinstance(one.value, dict) or not isinstance(other.value, dict):
         return other
     value = dict(one.value)
     for name, below in other.value.items():
         value[name] = _merged(value[name], below) if name in value else below
-    return Node(value, one.where)
+    return TextNode(value, one.where)
 
 
 def _dotted(path: Path) -> str:

@@ -62,7 +62,7 @@ def _outcome(record: RunRecord) -> Cell:
 
 
 def _met(record: RunRecord) -> Cell:
-    judged = [one for one in record.requirements.values() if one.met is not None]
+    judged = [requirement for requirement in record.requirements.values() if requirement.met is not None]
     met = sum(1 for one in judged if one.met)
     return Cell(
         f"{met} of {len(record.requirements)}", status="good" if met == len(record.requirements) else "bad"
@@ -74,11 +74,11 @@ def _noted(record: RunRecord, kind: str) -> str:
 
 
 def _computers(record: RunRecord) -> list[float | None]:
-    return [one.energy_j for one in record.processors.values()]
+    return [processor.energy_j for processor in record.processors.values()]
 
 
 def _vehicles(record: RunRecord) -> list[float | None]:
-    return [one.energy_j for one in record.vehicles.values()]
+    return [vehicle.energy_j for vehicle in record.vehicles.values()]
 
 
 def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Grid:
@@ -88,12 +88,17 @@ def requirements_comparison(labels: Sequence[str], records: Sequence[RunRecord])
         first = next(record.requirements[name] for record in records if name in record.requirements)
         cells = [Cell(name), Cell(bound(first), status="quiet")]
         for record in records:
-            one = record.requirements.get(name)
-            if one is None:
+            requirement = record.requirements.get(name)
+            if requirement is None:
                 cells.append(Cell("not required", status="quiet"))
             else:
-                judged = verdict(one)
-                cells.append(Cell(f"{figure(one.observed, one.unit)}  {judged.text}", status=judged.status))
+                judged = verdict(requirement)
+                cells.append(
+                    Cell(
+                        f"{figure(requirement.observed, requirement.unit)}  {judged.text}",
+                        status=judged.status,
+                    )
+                )
         rows.append(tuple(cells))
     columns = (Column("requirement"), Column("bound", True), *(Column(label, True) for label in labels))
     return Grid("Requirements", columns, tuple(rows))
@@ -187,8 +192,8 @@ def chain_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> Gri
         found = [record.chains.get(name) for record in records]
         latencies = [one.latency_s if one else LatencyRecord() for one in found]
         for first, question, values in (
-            (name, "p95 ms", [one.p95 for one in latencies]),
-            ("", "max ms", [one.max for one in latencies]),
+            (name, "p95 ms", [latency.p95 for latency in latencies]),
+            ("", "max ms", [latency.max for latency in latencies]),
         ):
             cells = [Cell(milliseconds(value), share=value) for value in values]
             rows.append((Cell(first), Cell(question, status="quiet"), *_relative(cells)))

@@ -37,7 +37,7 @@ from volery.report.flights import (
     YAW,
     Array,
     Curve,
-    Flight,
+    VehicleFlight,
     read_flights,
 )
 from volery.report.grids import Grid, labels
@@ -65,7 +65,7 @@ class Side:
 
     path: Path
     name: str
-    flights: tuple[Flight, ...]
+    flights: tuple[VehicleFlight, ...]
     record: RunRecord | None
 
 
@@ -110,7 +110,7 @@ class Comparison:
         for side in () if self.records else self.sides:
             if not side.flights:
                 raise UsageError(f"{side.path} has no vehicle, and a log is compared with flights alone")
-        self.flown: list[tuple[str, Flight]] = []
+        self.flown: list[tuple[str, VehicleFlight]] = []
         self.flights: list[list[FlightComparison]] = [[] for _ in sides]
         self.pairs: list[tuple[int, int]] = []
         self._pair(within_m)
@@ -122,7 +122,9 @@ class Comparison:
         for side, label in zip(self.sides, self.labels, strict=True):
             starts.append(len(self.flown))
             several = len(side.flights) > 1
-            self.flown += [(f"{label} {one.vehicle}" if several else label, one) for one in side.flights]
+            self.flown += [
+                (f"{label} {flight.vehicle}" if several else label, flight) for flight in side.flights
+            ]
         for number, side in enumerate(self.sides[1:], 1):
             for a, b in _partners(first.flights, side.flights):
                 here, there = self.flown[a], self.flown[starts[number] + b]
@@ -175,9 +177,9 @@ class Comparison:
                 title=" and ".join(dict.fromkeys(titles)),
                 subtitle=" · ".join(self.labels),
                 grids=self.run_grids,
-                verdicts=[one.verdict for one in self.all_flights],
-                alike=all(phase.alike for one in self.all_flights for phase in one.phases),
-                flights=[_grids(one) for one in self.all_flights],
+                verdicts=[flight.verdict for flight in self.all_flights],
+                alike=all(phase.alike for flight in self.all_flights for phase in flight.phases),
+                flights=[_grids(flight) for flight in self.all_flights],
                 runs=runs,
                 moving=bool(self.pairs),
                 charts=_CHARTS,
@@ -226,7 +228,7 @@ class Comparison:
         return path
 
 
-def _partners(first: Sequence[Flight], second: Sequence[Flight]) -> list[tuple[int, int]]:
+def _partners(first: Sequence[VehicleFlight], second: Sequence[VehicleFlight]) -> list[tuple[int, int]]:
     """Return the vehicles that are compared, by their places on each side."""
     places = {flight.vehicle: place for place, flight in enumerate(second)}
     same = [(place, places[one.vehicle]) for place, one in enumerate(first) if one.vehicle in places]
@@ -251,7 +253,7 @@ def _grids(one: FlightComparison) -> list[Grid]:
 # -- what is drawn
 
 
-def _span(flight: Flight) -> tuple[float, float]:
+def _span(flight: VehicleFlight) -> tuple[float, float]:
     """Return first arming and last disarming; without any the whole track."""
     if flight.armed:
         return flight.armed[0].begin, flight.armed[-1].end
@@ -265,12 +267,16 @@ def _within(curve: Curve, span: tuple[float, float]) -> tuple[Array, Array]:
     return curve.times[inside] - span[0], curve.values[inside]
 
 
-def _vehicle(name: str, flight: Flight) -> Json:
+def _vehicle(name: str, flight: VehicleFlight) -> Json:
     span = _span(flight)
     columns = [_within(flight.curves[one], span) for one in PLACE]
     times, points = columns[0][0], np.column_stack([values for _, values in columns])
     kept = thin_track(times, points, TRACK_TOLERANCE_M)
-    modes = [[round(one.at - span[0], 2), one.mode, one.armed] for one in flight.states if one.at >= span[0]]
+    modes = [
+        [round(state.at - span[0], 2), state.mode, state.armed]
+        for state in flight.states
+        if state.at >= span[0]
+    ]
     return {
         "name": name,
         "kind": "multirotor" if flight.flies else "rover",
@@ -281,7 +287,7 @@ def _vehicle(name: str, flight: Flight) -> Json:
     }
 
 
-def _differences(first: Flight, second: Flight) -> Json:
+def _differences(first: VehicleFlight, second: VehicleFlight) -> Json:
     """Return what the second has more than the first at the same time after arming, and their distance."""
     spans = _span(first), _span(second)
     until = min(end - begin for begin, end in spans)

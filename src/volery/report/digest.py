@@ -151,10 +151,10 @@ class Digest:
     def __init__(self, setup: RunSetup, scenery: Scenery | None) -> None:
         self._setup = setup
         self._scenery = scenery
-        self._tracks = {one.name: _Track(one.kind) for one in setup.vehicles}
-        self._load: dict[str, dict[str, list[Ns]]] = {one.name: {} for one in setup.processors}
+        self._tracks = {vehicle.name: _Track(vehicle.kind) for vehicle in setup.vehicles}
+        self._load: dict[str, dict[str, list[Ns]]] = {processor.name: {} for processor in setup.processors}
         self._misses: dict[str, list[int]] = {}
-        self._processor_of = {one.name: one.processor for one in setup.components}
+        self._processor_of = {component.name: component.processor for component in setup.components}
         self._noted: dict[str, dict[str, list[Milestone]]] = {}
         self._remarks: list[Json] = []
         self._collisions: list[Json] = []
@@ -315,7 +315,7 @@ class Digest:
         ]
 
     def _processor(self, name: str) -> Json:
-        cores = next((one.cores for one in self._setup.processors if one.name == name), 1)
+        cores = next((processor.cores for processor in self._setup.processors if processor.name == name), 1)
         count = max((len(bins) for bins in self._load[name].values()), default=0)
         count = max(count, -(-self._last // _BIN))
         together = max(1, -(-count // _MOST_BINS))

@@ -24,7 +24,7 @@ import numpy as np
 
 from volery.base.time import to_seconds
 from volery.report.digest import thin_track
-from volery.report.flights import ANGLES, DONE, EAST, HEIGHT, Answer, Array, Flight, Stretch
+from volery.report.flights import ANGLES, DONE, EAST, HEIGHT, Array, FlightAnswer, Stretch, VehicleFlight
 from volery.report.grids import NOTHING, Cell, Column, Grid, number
 from volery.trace.events import WARNING
 
@@ -48,7 +48,7 @@ _MOST_PAIRS = 2_000_000
 """Pairs of a point and a line that are computed at once."""
 
 
-class Phase(NamedTuple):
+class FlightPhase(NamedTuple):
     """A part of a flight that has a name."""
 
     name: str
@@ -61,7 +61,7 @@ class Phase(NamedTuple):
         return self.stretch.end - self.stretch.begin
 
 
-def phases(flight: Flight, *, by_operations: bool) -> list[Phase]:
+def phases(flight: VehicleFlight, *, by_operations: bool) -> list[FlightPhase]:
     """Return the phases of a flight in the order of their beginning, those that contain others first.
 
     Args:
@@ -72,24 +72,24 @@ def phases(flight: Flight, *, by_operations: bool) -> list[Phase]:
     found = _asked(flight) if by_operations else []
     for armed in flight.armed:
         climbs = _climbs(flight, armed) if flight.flies else []
-        found.append(Phase(ARMED if climbs or not flight.flies else ON_GROUND, armed))
+        found.append(FlightPhase(ARMED if climbs or not flight.flies else ON_GROUND, armed))
         if not by_operations:
-            found += [Phase(f"mode {mode}", stretch) for mode, stretch in flight.modes(armed)] + climbs
+            found += [FlightPhase(f"mode {mode}", stretch) for mode, stretch in flight.modes(armed)] + climbs
     return sorted(found, key=lambda one: (one.stretch.begin, -one.stretch.end))
 
 
-def _asked(flight: Flight) -> list[Phase]:
+def _asked(flight: VehicleFlight) -> list[FlightPhase]:
     found = []
-    for one in flight.operations:
-        begin, end = to_seconds(one.start), to_seconds(one.end)
+    for operation in flight.operations:
+        begin, end = to_seconds(operation.start), to_seconds(operation.end)
         arming = next((armed.begin for armed in flight.armed if begin < armed.begin < end), begin)
         if arming > begin:
-            found.append(Phase(BEFORE_ARMING, Stretch(begin, arming), one.asked))
-        found.append(Phase(one.operation, Stretch(arming, end), one.asked))
+            found.append(FlightPhase(BEFORE_ARMING, Stretch(begin, arming), operation.asked))
+        found.append(FlightPhase(operation.operation, Stretch(arming, end), operation.asked))
     return found
 
 
-def _climbs(flight: Flight, armed: Stretch) -> list[Phase]:
+def _climbs(flight: VehicleFlight, armed: Stretch) -> list[FlightPhase]:
     """Return the first climb and the last descent between arming and disarming: take-off and landing.
 
     The height at which it stands before and after does not matter: estimates drift on the ground.
@@ -98,9 +98,9 @@ def _climbs(flight: Flight, armed: Stretch) -> list[Phase]:
     half = _CLIMB_S / 2.0
     rates = (flight.values(HEIGHT, times + half) - flight.values(HEIGHT, times - half)) / _CLIMB_S
     climbs, descents = (_moves(times, rates * sign) for sign in (1.0, -1.0))
-    found = [Phase(TAKE_OFF, one) for one in climbs[:1]]
+    found = [FlightPhase(TAKE_OFF, climb) for climb in climbs[:1]]
     if not (flight.ends_armed and armed == flight.armed[-1]):
-        found += [Phase(LANDING, one) for one in descents[-1:]]  # a log may begin in the air
+        found += [FlightPhase(LANDING, descent) for descent in descents[-1:]]  # a log may begin in the air
     return found
 
 
@@ -179,7 +179,7 @@ class PhaseDifference:
         return {
             "phase": self.name,
             "asked": self.asked,
-            "seconds": [_rounded(one) for one in self.seconds],
+            "seconds": [_rounded(second) for second in self.seconds],
             "longer_s": _rounded(self.longer_s),
             "ends_east_north_up_m": [None if end is None else list(map(_rounded, end)) for end in self.ends],
             "ends_apart_m": _rounded(self.ends_apart_m),
@@ -195,7 +195,7 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 3)
 
 
-class Row(NamedTuple):
+class ComparedRow(NamedTuple):
     """Something of both sides: what it is, and how often, or with what outcome, each has it; None: not."""
 
     what: str
@@ -223,7 +223,7 @@ class FlightComparison:
     labels: tuple[str, str]
     within_m: float
     phases: tuple[PhaseDifference, ...]
-    answers: tuple[Row, ...]
+    answers: tuple[ComparedRow, ...]
     texts: tuple[Said, ...]
     said_by_both: int
 
@@ -231,7 +231,7 @@ class FlightComparison:
     def verdict(self) -> str:
         """One line: how many phases are alike, and what differs most."""
         first, second = self.labels
-        both = [one for one in self.phases if one.excess is not None]
+        both = [phase for phase in self.phases if phase.excess is not None]
         if not both:
             return f"{second} against {first}: they have no phase in common"
         alike = sum(one.alike for one in both)
@@ -240,7 +240,7 @@ class FlightComparison:
         if not worst.alike:
             words.append(f"most different is {worst.name}, {worst.verdict}")
         for side, label in enumerate(self.labels):
-            only = [one.name for one in self.phases if one.seconds[1 - side] is None]
+            only = [phase.name for phase in self.phases if phase.seconds[1 - side] is None]
             if only:
                 words.append(f"only {label} has {', '.join(only)}")
         return "; ".join(words)
@@ -251,22 +251,22 @@ class FlightComparison:
             "sides": list(self.labels),
             "verdict": self.verdict,
             "criterion": {"duration_share": SHARE, "duration_least_s": LEAST_S, "path_m": self.within_m},
-            "phases": [one.plain() for one in self.phases],
-            "answers": [one._asdict() for one in self.answers],
+            "phases": [phase.plain() for phase in self.phases],
+            "answers": [answer._asdict() for answer in self.answers],
             "texts_of_one_side": [
                 {
-                    **one._asdict(),
-                    "side": self.labels[one.side],
-                    "after_arming_s": _rounded(one.after_arming_s),
+                    **text._asdict(),
+                    "side": self.labels[text.side],
+                    "after_arming_s": _rounded(text.after_arming_s),
                 }
-                for one in self.texts
+                for text in self.texts
             ],
             "texts_of_both": self.said_by_both,
         }
 
 
 def compare_flights(
-    first: Flight, second: Flight, labels: tuple[str, str], within_m: float = WITHIN_M
+    first: VehicleFlight, second: VehicleFlight, labels: tuple[str, str], within_m: float = WITHIN_M
 ) -> FlightComparison:
     """Compare two flights.
 
@@ -301,10 +301,10 @@ def compare_flights(
     )
 
 
-Pair = tuple[Phase | None, Phase | None]
+Pair = tuple[FlightPhase | None, FlightPhase | None]
 
 
-def _matched(own: Sequence[Phase], others: Sequence[Phase]) -> list[Pair]:
+def _matched(own: Sequence[FlightPhase], others: Sequence[FlightPhase]) -> list[Pair]:
     """Return the phases in pairs: what all flights have by number, operations and modes in their order."""
     pairs: list[Pair] = []
     for name in COMMON:
@@ -320,8 +320,8 @@ def _matched(own: Sequence[Phase], others: Sequence[Phase]) -> list[Pair]:
 
 
 def _gaps(
-    own: Sequence[Phase], others: Sequence[Phase], pairs: list[Pair]
-) -> Iterable[tuple[Sequence[Phase], Sequence[Phase]]]:
+    own: Sequence[FlightPhase], others: Sequence[FlightPhase], pairs: list[Pair]
+) -> Iterable[tuple[Sequence[FlightPhase], Sequence[FlightPhase]]]:
     """Add the pairs that were asked the same, and yield what lies between them on each side."""
     keys = ([(one.name, one.asked) for one in side] for side in (own, others))
     i = j = 0
@@ -345,7 +345,11 @@ def _numbered(pairs: Iterable[Pair]) -> list[str]:
 
 
 def _difference(
-    name: str, flights: tuple[Flight, Flight], pair: Pair, labels: tuple[str, str], within_m: float
+    name: str,
+    flights: tuple[VehicleFlight, VehicleFlight],
+    pair: Pair,
+    labels: tuple[str, str],
+    within_m: float,
 ) -> PhaseDifference:
     first, second = pair
     asked = next((one.asked for one in pair if one is not None and one.asked), "")
@@ -389,14 +393,14 @@ def _known(value: float) -> float | None:
     return None if isnan(value) else value
 
 
-def _end(flight: Flight, phase: Phase | None) -> tuple[float, ...] | None:
+def _end(flight: VehicleFlight, phase: FlightPhase | None) -> tuple[float, ...] | None:
     if phase is None or not len(flight.curves[EAST].times):
         return None
     (place,) = flight.places(np.array([phase.stretch.end]))
     return tuple(place.tolist())
 
 
-def _from_begin(flight: Flight, times: Array) -> Array:
+def _from_begin(flight: VehicleFlight, times: Array) -> Array:
     """Return the places at some times from the first of them."""
     places = flight.places(times)
     from_first: Array = places - places[0]
@@ -418,7 +422,9 @@ def _farthest(points: Array, way: Array) -> float:
     return farthest
 
 
-def _rms(flights: tuple[Flight, Flight], angle: str, times: tuple[Array, Array]) -> float | None:
+def _rms(
+    flights: tuple[VehicleFlight, VehicleFlight], angle: str, times: tuple[Array, Array]
+) -> float | None:
     first, second = (flight.values(angle, at) for flight, at in zip(flights, times, strict=True))
     return _known(float(np.sqrt(np.mean(np.square(turned(second - first))))))
 
@@ -432,15 +438,15 @@ def turned(degrees: Array) -> Array:
 # -- answers and texts
 
 
-def _answers(first: Iterable[Answer], second: Iterable[Answer]) -> Iterable[Row]:
+def _answers(first: Iterable[FlightAnswer], second: Iterable[FlightAnswer]) -> Iterable[ComparedRow]:
     """Yield what was asked, in order, with the outcome on each side; the same in succession once."""
     a, b = (_repeated(side) for side in (first, second))
     for i, j in aligned([asked for asked, _ in a], [asked for asked, _ in b]):
         outcomes = None if i is None else a[i][1], None if j is None else b[j][1]
-        yield Row(a[i][0] if i is not None else b[j or 0][0], *outcomes)
+        yield ComparedRow(a[i][0] if i is not None else b[j or 0][0], *outcomes)
 
 
-def _repeated(answers: Iterable[Answer]) -> list[tuple[str, str]]:
+def _repeated(answers: Iterable[FlightAnswer]) -> list[tuple[str, str]]:
     found = []
     for (asked, outcome, said), group in groupby(answers, key=lambda one: one[1:]):
         times = sum(1 for _ in group)
@@ -458,12 +464,14 @@ def _meaning(text: str) -> str:
     return _NUMBER.sub("#", _MODULE.sub("", text))
 
 
-def _said(flights: tuple[Flight, Flight], begins: Sequence[float]) -> tuple[tuple[Said, ...], int]:
+def _said(
+    flights: tuple[VehicleFlight, VehicleFlight], begins: Sequence[float]
+) -> tuple[tuple[Said, ...], int]:
     """Return the texts of one side alone in the order of their times, and how many both sides have."""
-    meanings = [Counter(_meaning(one.text) for one in flight.texts) for flight in flights]
+    meanings = [Counter(_meaning(text.text) for text in flight.texts) for flight in flights]
     only = []
     for side, flight in enumerate(flights):
-        first = {_meaning(one.text): one for one in reversed(flight.texts)}
+        first = {_meaning(text.text): text for text in reversed(flight.texts)}
         for meaning, times in meanings[side].items():
             if meaning not in meanings[1 - side]:
                 one = first[meaning]
@@ -481,10 +489,10 @@ _LONGEST_HEADING = 18
 def _headings(labels: tuple[str, str]) -> tuple[str, str]:
     """Return the labels, without the middle of long ones, as headings of columns."""
     first, second = (
-        one
-        if len(one) <= _LONGEST_HEADING
-        else f"{one[: _LONGEST_HEADING // 2 - 1]}…{one[-_LONGEST_HEADING // 2 :]}"
-        for one in labels
+        label
+        if len(label) <= _LONGEST_HEADING
+        else f"{label[: _LONGEST_HEADING // 2 - 1]}…{label[-_LONGEST_HEADING // 2 :]}"
+        for label in labels
     )
     return (first, second) if first != second else ("first", "second")
 
@@ -524,8 +532,8 @@ def answer_grid(compared: FlightComparison) -> Grid:
     """Return what was asked, and the outcome on each side."""
     columns = (Column("asked"), *map(Column, _headings(compared.labels)))
     rows = tuple(
-        (Cell(one.what), *(_outcome(outcome) for outcome in (one.first, one.second)))
-        for one in compared.answers
+        (Cell(answer.what), *(_outcome(outcome) for outcome in (answer.first, answer.second)))
+        for answer in compared.answers
     )
     return Grid("Answers", columns, rows)
 
@@ -546,15 +554,15 @@ def text_grid(compared: FlightComparison) -> Grid:
     )
     rows = tuple(
         (
-            Cell(number(one.after_arming_s)),
-            Cell(_headings(compared.labels)[one.side]),
-            Cell(str(one.severity)),
+            Cell(number(text.after_arming_s)),
+            Cell(_headings(compared.labels)[text.side]),
+            Cell(str(text.severity)),
             Cell(
-                f"{one.text} ×{one.times}" if one.times > 1 else one.text,
-                status="warn" if one.severity <= WARNING else "",
+                f"{text.text} ×{text.times}" if text.times > 1 else text.text,
+                status="warn" if text.severity <= WARNING else "",
             ),
         )
-        for one in compared.texts
+        for text in compared.texts
     )
     both = f"; {compared.said_by_both} are said by both" if compared.said_by_both else ""
     return Grid(f"Texts of one side alone{both}", columns, rows)

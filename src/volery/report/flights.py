@@ -37,7 +37,7 @@ from volery.links.flight_logs import (
 from volery.links.mavlink_messages import entry_name
 from volery.trace.events import Operation, Text, VehicleState
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 from volery.vehicles.drivers.ardupilot.modes import mode_name as ardupilot_mode
 from volery.vehicles.drivers.px4.modes import MODES as PX4_MODES
 from volery.vehicles.drivers.px4.modes import mode_name as px4_mode
@@ -74,7 +74,7 @@ class Stretch(NamedTuple):
     end: float
 
 
-class Answer(NamedTuple):
+class FlightAnswer(NamedTuple):
     """What a vehicle was asked, and what came of it: an operation of a run, an acknowledgement in a log."""
 
     at: float
@@ -84,7 +84,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Flight:
+class VehicleFlight:
     """What one vehicle did.
 
     Attributes:
@@ -103,13 +103,15 @@ class Flight:
     states: tuple[State, ...]
     flies: bool = True
     operations: tuple[Operation, ...] = ()
-    answers: tuple[Answer, ...] = ()
+    answers: tuple[FlightAnswer, ...] = ()
     texts: tuple[LoggedText, ...] = ()
 
     @cached_property
     def armed(self) -> tuple[Stretch, ...]:
         """Every stretch from arming to disarming, or to the last known position."""
-        last = max((float(one.times[-1]) for one in self.curves.values() if len(one.times)), default=0.0)
+        last = max(
+            (float(curve.times[-1]) for curve in self.curves.values() if len(curve.times)), default=0.0
+        )
         found: list[Stretch] = []
         for state, end in _lasting(self.states, last):
             if not state.armed:
@@ -156,7 +158,7 @@ def _lasting(states: Sequence[State], last: float) -> Iterable[tuple[State, floa
         yield states[-1], max(last, states[-1].at)
 
 
-def read_flights(path: Path) -> tuple[Flight, ...]:
+def read_flights(path: Path) -> tuple[VehicleFlight, ...]:
     """Return the flights in a run folder or a log, one for each vehicle.
 
     Args:
@@ -194,7 +196,7 @@ def _tidy(said: LoggedText) -> LoggedText:
     return said._replace(text=" ".join(said.text.split()))
 
 
-def _about_arming(flight: Flight) -> Flight:
+def _about_arming(flight: VehicleFlight) -> VehicleFlight:
     """Return the flight with its track about the place where it first arms, else where it begins."""
     times = flight.curves[EAST].times
     if not len(times):
@@ -220,16 +222,16 @@ def _curves(times: Array, columns: Mapping[str, Array]) -> dict[str, Curve]:
 
 def _changes(states: Iterable[State]) -> tuple[State, ...]:
     found: list[State] = []
-    for one in states:
-        if not found or found[-1][1:] != one[1:]:
-            found.append(one)
+    for state in states:
+        if not found or found[-1][1:] != state[1:]:
+            found.append(state)
     return tuple(found)
 
 
 # -- runs
 
 
-def _flights_of_run(folder: Path) -> tuple[Flight, ...]:
+def _flights_of_run(folder: Path) -> tuple[VehicleFlight, ...]:
     if not (folder / TRACE_FILE).exists():
         raise UsageError(
             f"{folder} has no {TRACE_FILE}: it is no run folder, or its run was recorded without a trace; "
@@ -238,8 +240,8 @@ def _flights_of_run(folder: Path) -> tuple[Flight, ...]:
     states: dict[str, list[VehicleState]] = {}
     operations: dict[str, list[Operation]] = {}
     texts: dict[str, list[LoggedText]] = {}
-    with Reading(folder / TRACE_FILE) as reading:
-        kinds = {one.name: one.kind for one in reading.setup.vehicles}
+    with OpenTrace(folder / TRACE_FILE) as reading:
+        kinds = {vehicle.name: vehicle.kind for vehicle in reading.setup.vehicles}
         for event in reading.events({VehicleState, Operation, Text}):
             if isinstance(event, VehicleState):
                 states.setdefault(event.vehicle, []).append(event)
@@ -250,13 +252,15 @@ def _flights_of_run(folder: Path) -> tuple[Flight, ...]:
                 texts.setdefault(event.source, []).append(_tidy(said))
     return tuple(
         _about_arming(
-            Flight(
+            VehicleFlight(
                 name,
                 _curves_of_run(seen),
                 _changes(State(to_seconds(one.at), one.armed, one.mode) for one in seen),
                 kinds.get(name) != "rover",
                 asked := tuple(sorted(operations.get(name, ()), key=lambda one: one.start)),
-                tuple(Answer(to_seconds(one.start), one.operation, one.outcome, one.said) for one in asked),
+                tuple(
+                    FlightAnswer(to_seconds(one.start), one.operation, one.outcome, one.said) for one in asked
+                ),
                 tuple(texts.get(name, ())),
             )
         )
@@ -305,12 +309,12 @@ def _flight(
     vehicle: str,
     curves: Mapping[str, Curve],
     states: Iterable[State],
-    answers: Iterable[Answer],
+    answers: Iterable[FlightAnswer],
     texts: Iterable[LoggedText],
     *,
     flies: bool = True,
-) -> Flight:
-    return Flight(
+) -> VehicleFlight:
+    return VehicleFlight(
         vehicle.rstrip(".") or "vehicle",
         {name: curves.get(name, _UNKNOWN) for name in (*PLACE, *ANGLES, SPEED, BATTERY)},
         _changes(states),
@@ -321,7 +325,7 @@ def _flight(
     )
 
 
-def _flight_of_tlog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> Flight:
+def _flight_of_tlog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> VehicleFlight:
     def table(name: str) -> Table:
         rows = tables.get(f"{vehicle}{name}", _NONE)
         return {**rows, TIME: clock(rows[TIME])}
@@ -354,10 +358,12 @@ def _flight_of_tlog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -
         curves |= _local_track(local)
     uploads = table("MISSION_ACK")
     answers = _acknowledged(table("COMMAND_ACK"), "command", "result") + [
-        Answer(float(at), "mission", entry_name("MAV_MISSION_RESULT", int(kind)).removeprefix("MAV_MISSION_"))
+        FlightAnswer(
+            float(at), "mission", entry_name("MAV_MISSION_RESULT", int(kind)).removeprefix("MAV_MISSION_")
+        )
         for at, kind in zip(uploads[TIME], uploads.get("type", ()), strict=True)
     ]
-    said = [one._replace(time=float(clock(np.array([one.time]))[0])) for one in texts]
+    said = [text._replace(time=float(clock(np.array([text.time]))[0])) for text in texts]
     return _flight(vehicle, curves, states, answers, said, flies=flies)
 
 
@@ -376,10 +382,10 @@ def _own_clock(tables: Tables, vehicle: str) -> Callable[[Array], Array]:
     return lambda times: times
 
 
-def _acknowledged(rows: Table, command: str, result: str) -> list[Answer]:
+def _acknowledged(rows: Table, command: str, result: str) -> list[FlightAnswer]:
     """Return the commands that were answered, each with its last answer."""
     return [
-        Answer(
+        FlightAnswer(
             float(at),
             "SET_MODE" if asked == _SET_MODE else entry_name("MAV_CMD", int(asked)),
             entry_name("MAV_RESULT", int(outcome)),
@@ -411,7 +417,7 @@ def _local_track(rows: Table) -> dict[str, Curve]:
     return _curves(rows[TIME], {EAST: rows["y"], NORTH: rows["x"], HEIGHT: -rows["z"], SPEED: speed})
 
 
-def _flight_of_dataflash(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> Flight:
+def _flight_of_dataflash(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> VehicleFlight:
     attitude, power = tables.get("ATT", _NONE), tables.get("BAT", _NONE)
     columns = {name: attitude[name.capitalize()] for name in ANGLES if name.capitalize() in attitude}
     curves = _curves(attitude[TIME], columns)
@@ -423,7 +429,7 @@ def _flight_of_dataflash(tables: Tables, vehicle: str, texts: Sequence[LoggedTex
             curves |= _global_track(rows[TIME], rows["Lat"], rows["Lng"], rows["Alt"])
     if "VZ" in fixes:
         curves |= _curves(fixes[TIME], {SPEED: _length(fixes["Spd"], fixes["VZ"])})
-    rover = any("Rover" in one.text for one in texts)
+    rover = any("Rover" in text.text for text in texts)
     states = _states_of_dataflash(tables, ROVER_KIND if rover else DRONE_KIND)
     answers = _acknowledged(tables.get("MAVC", _NONE), "Cmd", "Res")
     return _flight(vehicle, curves, states, answers, texts, flies=not rover)
@@ -453,7 +459,7 @@ def _states_of_dataflash(tables: Tables, kind: str) -> list[State]:
     return [at(time) for time in sorted({time for time, _ in (*armed, *named)})]
 
 
-def _flight_of_ulog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> Flight:
+def _flight_of_ulog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -> VehicleFlight:
     attitude, local = tables.get("vehicle_attitude", _NONE), tables.get("vehicle_local_position", _NONE)
     status, power = tables.get("vehicle_status", _NONE), tables.get("battery_status", _NONE)
     curves = _local_track(local) if "x" in local else {}
@@ -473,7 +479,7 @@ def _flight_of_ulog(tables: Tables, vehicle: str, texts: Sequence[LoggedText]) -
     return _flight(vehicle, curves, states, answers, texts)
 
 
-_READ: Mapping[str, Callable[[Tables, str, Sequence[LoggedText]], Flight]] = {
+_READ: Mapping[str, Callable[[Tables, str, Sequence[LoggedText]], VehicleFlight]] = {
     TLOG: _flight_of_tlog,
     DATAFLASH: _flight_of_dataflash,
     ULOG: _flight_of_ulog,

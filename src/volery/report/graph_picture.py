@@ -21,7 +21,7 @@ from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED
 from volery.trace.events import Call, Message, Omitted, Published, Unserved
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 GRAPH_NAME_PREFIX = "/"
 
@@ -41,7 +41,7 @@ def graph_of_run(folder: Path) -> GraphSnapshot:
     subscribers: dict[str, dict[str, None]] = {}
     services: dict[str, str] = {}
     last = 0
-    with Reading(folder / TRACE_FILE) as reading:
+    with OpenTrace(folder / TRACE_FILE) as reading:
         for event in reading.events():
             if isinstance(event, Published | Omitted):
                 types[event.topic] = event.type
@@ -84,18 +84,21 @@ def graph_of_model(system: System) -> GraphSnapshot:
     publishers: dict[str, list[str]] = {}
     subscribers: dict[str, list[str]] = {}
     types: dict[str, str] = {}
-    for one in system.instances:
-        node, component = full_node_name(one.node_name or one.name, one.namespace), one.component
-        remaps = absolute_remaps(one.remap, one.namespace, node)
+    for instance in system.instances:
+        node, component = (
+            full_node_name(instance.node_name or instance.name, instance.namespace),
+            instance.component,
+        )
+        remaps = absolute_remaps(instance.remap, instance.namespace, node)
         for stated, found in ((component.publishes, publishers), (component.subscribes, subscribers)):
             for name, topic in stated.items():
-                absolute = absolute_name(name, one.namespace, node)
+                absolute = absolute_name(name, instance.namespace, node)
                 absolute = remaps.get(absolute, absolute)
                 types[absolute] = topic.type
                 found.setdefault(absolute, []).append(node)
-        for connection in one.connections.values():
+        for connection in instance.connections.values():
             for target in connection.targets:
-                if target.kind is TargetKind.VEHICLE and not one.is_environment:
+                if target.kind is TargetKind.VEHICLE and not instance.is_environment:
                     state, commands = f"/{target.name}/… (state)", f"/{target.name}/… (commands)"
                     publishers.setdefault(state, [f"/{target.name}"])
                     subscribers.setdefault(state, []).append(node)

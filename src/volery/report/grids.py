@@ -107,7 +107,11 @@ def band(error: float | None) -> str:
 
 def widest_band(record: RunRecord) -> str:
     """Return the widest error band of the energies of a run's processors; empty if none is known."""
-    known = [one.energy_error for one in record.processors.values() if one.energy_error is not None]
+    known = [
+        processor.energy_error
+        for processor in record.processors.values()
+        if processor.energy_error is not None
+    ]
     return band(max(known, default=None))
 
 
@@ -180,7 +184,7 @@ def requirements_grid(record: RunRecord) -> Grid:
 
 def cost_grid(record: RunRecord) -> Grid:
     """Return the cost of each component on its processor."""
-    longest = max((one.cpu_s for one in record.components.values()), default=0.0)
+    longest = max((component.cpu_s for component in record.components.values()), default=0.0)
     rows = tuple(_cost_row(name, one, longest) for name, one in record.components.items())
     columns = (
         Column("component"),
@@ -266,8 +270,13 @@ MOST_PREEMPTIONS = 20
 def preemptions_grid(record: RunRecord) -> Grid:
     """Return the most frequent preemptions."""
     rows = tuple(
-        (Cell(one.processor), Cell(one.preempted), Cell(one.by), Cell(count(one.count)))
-        for one in record.preemptions[:MOST_PREEMPTIONS]
+        (
+            Cell(preemption.processor),
+            Cell(preemption.preempted),
+            Cell(preemption.by),
+            Cell(count(preemption.count)),
+        )
+        for preemption in record.preemptions[:MOST_PREEMPTIONS]
     )
     columns = (Column("processor"), Column("task"), Column("preempted by"), Column("times", True))
     return Grid("Preemptions", columns, rows)
@@ -275,7 +284,7 @@ def preemptions_grid(record: RunRecord) -> Grid:
 
 def ros_calls_grid(record: RunRecord) -> Grid:
     """Return the number of ROS calls of each component, by kind of call."""
-    kinds = sorted({kind for one in record.components.values() for kind in one.ros_calls})
+    kinds = sorted({kind for component in record.components.values() for kind in component.ros_calls})
     rows = tuple(
         (
             Cell(name),
@@ -317,8 +326,8 @@ def processors_grid(record: RunRecord) -> Grid:
 
 def vehicles_grid(record: RunRecord) -> Grid:
     """Return the distance, time, energy and errors of each vehicle."""
-    swapped = any(one.battery_swaps for one in record.vehicles.values())
-    charged = any(one.charging_s for one in record.vehicles.values())
+    swapped = any(vehicle.battery_swaps for vehicle in record.vehicles.values())
+    charged = any(vehicle.charging_s for vehicle in record.vehicles.values())
     rows = tuple(
         (
             *_vehicle_row(name, one),
@@ -421,7 +430,7 @@ def by_state(counts: Mapping[str, int]) -> str:
 
 def last_states(subjects: Mapping[str, NoteRecord]) -> Counter[str]:
     """Return the number of subjects in each state at the end."""
-    return Counter(one.state for one in subjects.values())
+    return Counter(subject.state for subject in subjects.values())
 
 
 def note_grids(record: RunRecord) -> list[Grid]:

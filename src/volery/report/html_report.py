@@ -49,7 +49,7 @@ from volery.requirements.record import RUN_FILE, RunRecord, Status, read_record,
 from volery.trace.attachments import WORLD_ATTACHMENT, RunSetup, scenery_from_json
 from volery.trace.events import Event, Record, Verdict
 from volery.trace.mcap_writer import OUTCOME, TRACE_FILE, Attachment
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 from volery.trace.timeline import TimelineWriter
 
 try:
@@ -89,7 +89,7 @@ class HtmlReport:
     """
 
     def __init__(self, setup: RunSetup, attachments: Iterable[Attachment]) -> None:
-        self._digest = _digest(setup, {one.name: one for one in attachments})
+        self._digest = _digest(setup, {attachment.name: attachment for attachment in attachments})
 
     def __call__(self, event: Event) -> None:
         """Take an event."""
@@ -122,7 +122,7 @@ def gather(folder: Path, *taps: Record) -> ReportContent:
     Raises:
         UsageError: There is no trace, or it ends before its header.
     """
-    with Reading(folder / TRACE_FILE) as reading:
+    with OpenTrace(folder / TRACE_FILE) as reading:
         digest = _digest(reading.setup, reading.attachments)
         if (folder / RUN_FILE).exists():
             record = read_record(folder)
@@ -133,7 +133,7 @@ def gather(folder: Path, *taps: Record) -> ReportContent:
     return ReportContent(record, digest.data(record.sim_s), reading.lost)
 
 
-def _account(reading: Reading, taps: Iterable[Record]) -> RunRecord:
+def _account(reading: OpenTrace, taps: Iterable[Record]) -> RunRecord:
     from volery.requirements.verdicts import Observers, bounds_of
 
     accounts = Accounts(reading.setup)
@@ -236,9 +236,9 @@ def render(material: ReportContent) -> str:
 def _omitted(topics: list[Json]) -> list[str]:
     """Return a line for each topic whose messages are in the trace without their content."""
     return [
-        f"{one['topic']}: {one['messages']} messages of {one['bytes'] / 1e6:.1f} MB; "
-        f"volery simulate --record {one['topic']} records their content, too"
-        for one in topics
+        f"{topic['topic']}: {topic['messages']} messages of {topic['bytes'] / 1e6:.1f} MB; "
+        f"volery simulate --record {topic['topic']} records their content, too"
+        for topic in topics
     ]
 
 
@@ -278,7 +278,7 @@ def _outcome(record: RunRecord) -> Fact:
         return Fact("completed", "no requirement was judged", status="warn")
     if outcome.requirements_met:
         return Fact("completed", "all requirements met", status="good")
-    missed = sum(1 for one in record.requirements.values() if one.met is False)
+    missed = sum(1 for requirement in record.requirements.values() if requirement.met is False)
     return Fact("completed", f"{missed} of {len(record.requirements)} requirements not met", status="bad")
 
 
@@ -292,18 +292,18 @@ def _facts(record: RunRecord) -> list[Fact]:
         value, rest = f"{most} of {len(subjects)}", by_state(dict(others[:_MOST_OTHERS]))
         facts.append(Fact(f"{plural(kind)} {state}", value, rest))
     if record.vehicles:
-        flown = sum(one.distance_m for one in record.vehicles.values())
+        flown = sum(vehicle.distance_m for vehicle in record.vehicles.values())
         facts.append(
             Fact("driven and flown", number(flown / 1000.0, 2, "km"), _many(len(record.vehicles), "vehicle"))
         )
-    computers = total([one.energy_j for one in record.processors.values()])
-    vehicles = total([one.energy_j for one in record.vehicles.values()])
+    computers = total([processor.energy_j for processor in record.processors.values()])
+    vehicles = total([vehicle.energy_j for vehicle in record.vehicles.values()])
     if computers is not None:
         facts.append(Fact("energy of computers", energy(computers), widest_band(record)))
     if vehicles is not None:
         facts.append(Fact("energy of vehicles", energy(vehicles)))
-    misses = sum(one.deadline_misses for one in record.components.values())
-    if any(one.activations for one in record.components.values()):
+    misses = sum(component.deadline_misses for component in record.components.values())
+    if any(component.activations for component in record.components.values()):
         facts.append(Fact("missed deadlines", str(misses), status="bad" if misses else ""))
     return facts
 
@@ -313,7 +313,7 @@ def _many(count: int, noun: str) -> str:
 
 
 def _troubles(record: RunRecord, lost: str) -> list[str]:
-    said = [f"{moment(one.at_s)}  {one.who}: {one.what}" for one in record.failures]
+    said = [f"{moment(failure.at_s)}  {failure.who}: {failure.what}" for failure in record.failures]
     if record.outcome.status != "completed" and record.outcome.reason != lost:
         said.insert(0, f"{record.outcome.status}: {record.outcome.reason}")
     return [*said, f"the trace: {lost}"] if lost else said
@@ -359,7 +359,7 @@ def _lane(name: str, steps: list[Json], colours: Mapping[str, int], end: float) 
 
 def _ticks(end: float) -> list[dict[str, Any]]:
     steps = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200)
-    step = next((one for one in steps if end / one <= 8), 86400)
+    step = next((step for step in steps if end / step <= 8), 86400)
     count = int(end // step) if end > 0 else 0
     return [
         {"left": 100.0 * index * step / end, "text": moment(index * step)[:-4]}
@@ -421,7 +421,7 @@ def recover(folder: Path) -> Recovered:
     else:
         if cut:
             (folder / RUN_FILE).unlink()
-        with Reading(folder / TRACE_FILE):
+        with OpenTrace(folder / TRACE_FILE):
             pass  # raises before a file is made
         timeline = TimelineWriter(folder / TIMELINE_FILE)
         try:

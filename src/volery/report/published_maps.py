@@ -124,9 +124,9 @@ class PublishedMaps:
         pictures = [_picture(event, message) for event, message in decoded[_PICTURE]]
         return {
             "maps": maps,
-            "paths": [one for one in paths if len(one["points"]) > 1],
-            "scans": [one for one in scans if one],
-            "pictures": [one for one in pictures if one],
+            "paths": [path for path in paths if len(path["points"]) > 1],
+            "scans": [scan for scan in scans if scan],
+            "pictures": [picture for picture in pictures if picture],
         }
 
     def _decoded(self, kind: str) -> list[tuple[Published, Any]]:
@@ -175,8 +175,8 @@ def _from_start(stamp: Ns, event: Published) -> float:
 
 def _way(event: Published, message: Any) -> _Way:
     rows = [
-        (nanoseconds(one.header.stamp), complex(one.pose.position.x, one.pose.position.y), one.pose)
-        for one in message.poses
+        (nanoseconds(pose.header.stamp), complex(pose.pose.position.x, pose.pose.position.y), pose.pose)
+        for pose in message.poses
     ]
     stamps = [stamp for stamp, _, _ in rows]
     ended = nanoseconds(message.header.stamp)

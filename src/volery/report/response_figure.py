@@ -13,12 +13,12 @@ import numpy as np
 
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
-from volery.control.step_response import BANDS, Signal, StepResponse
+from volery.control.step_response import BANDS, ControlledSignal, StepResponse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Judged = tuple[Signal, Sequence[StepResponse]]
+Judged = tuple[ControlledSignal, Sequence[StepResponse]]
 """A signal and the responses found in it."""
 FORMATS = (".png", ".svg", ".pdf")
 GOAL, MEASURED, BAND = "#8a8f98", "#0b5fa5", "#f2c14e"
@@ -50,7 +50,7 @@ def draw_records(judged: Sequence[Judged], path: Path) -> None:
         if goal is not None:
             axes.plot(signal.times, goal, color=GOAL, linewidth=1.2, linestyle="--", label="set-point")
         axes.plot(signal.times, values, color=MEASURED, linewidth=1.4, label="measured")
-        offsets = np.interp([one.start for one in responses], signal.times, values)
+        offsets = np.interp([response.start for response in responses], signal.times, values)
         for number, (one, offset) in enumerate(zip(responses, offsets, strict=True)):
             aim = one.goal + (offset - one.origin)
             band = BANDS[0] * abs(one.size)
@@ -105,7 +105,7 @@ def _figure(rows: int, path: Path) -> tuple[Figure, list[Any]]:
     return figure, [figure.add_subplot(rows, 1, row + 1) for row in range(rows)]
 
 
-def _continuous(signal: Signal) -> tuple[Any, Any]:
+def _continuous(signal: ControlledSignal) -> tuple[Any, Any]:
     """Return measurement and set-point without the jumps of an angle that passes its largest value."""
     if signal.period is None:
         return signal.measured, signal.goal

@@ -35,7 +35,7 @@ class GridTable:
 
 
 def _table(grid: Grid, *, essential: bool = False, wrapped: bool = False) -> Table:
-    made = Table(
+    table = Table(
         title=grid.title,
         title_justify="left",
         title_style="bold",
@@ -48,7 +48,7 @@ def _table(grid: Grid, *, essential: bool = False, wrapped: bool = False) -> Tab
         column = grid.columns[index]
         whole = column.numeric or index == 0  # a truncated name or figure would mislead
         side: JustifyMethod = "right" if column.numeric else "left"
-        made.add_column(
+        table.add_column(
             column.title,
             justify=side,
             no_wrap=whole and not wrapped,
@@ -56,8 +56,8 @@ def _table(grid: Grid, *, essential: bool = False, wrapped: bool = False) -> Tab
             min_width=_longest_word(grid, index) if wrapped else None,
         )
     for row in grid.rows:
-        made.add_row(*(_text(row[index]) for index in shown))
-    return made
+        table.add_row(*(_text(row[index]) for index in shown))
+    return table
 
 
 def _longest_word(grid: Grid, index: int) -> int:

@@ -18,7 +18,7 @@ from volery.requirements.added_observables import AddedInRun, load_added
 from volery.requirements.ledgers import (
     ChainLedger,
     ComponentLedger,
-    Distribution,
+    DurationStatistics,
     EnergyLaw,
     NetworkLedger,
     Quantities,
@@ -96,16 +96,18 @@ class Accounts:
     def __init__(self, setup: RunSetup, energy: EnergyLaw = linear_energy) -> None:
         self.setup = setup
         self._energy = energy
-        self._components = {one.name: ComponentLedger(one, one.processor) for one in setup.components}
+        self._components = {
+            component.name: ComponentLedger(component, component.processor) for component in setup.components
+        }
         self._declared = tuple(self._components)
-        self._processors = {one.name: one for one in setup.processors}
+        self._processors = {processor.name: processor for processor in setup.processors}
         self._busy: dict[str, Ns] = dict.fromkeys(self._processors, 0)
-        self._vehicles = {one.name: VehicleLedger(one) for one in setup.vehicles}
+        self._vehicles = {vehicle.name: VehicleLedger(vehicle) for vehicle in setup.vehicles}
         self._notes: dict[str, dict[str, list[Milestone]]] = {}
         self._added = tuple(AddedInRun(name, made, setup) for name, made in load_added().items())
         self._verdicts: dict[str, Verdict] = {}
-        self._chains = {one.name: ChainLedger(one) for one in setup.chains}
-        self._networks = {one.name: NetworkLedger() for one in setup.networks}
+        self._chains = {chain.name: ChainLedger(chain) for chain in setup.chains}
+        self._networks = {network.name: NetworkLedger() for network in setup.networks}
         self._collisions: Counter[str] = Counter()
         self._lost_messages = 0
         self._demands = Demands()
@@ -290,7 +292,7 @@ class Accounts:
             requirements=self._requirements(),
             chains={name: chain.record() for name, chain in self._chains.items()},
             preemptions=self._preemption_records(),
-            failures=[_failure(one) for one in self._failures],
+            failures=[_failure(failure) for failure in self._failures],
             laws=[LawRecord.model_validate(asdict(law)) for law in setup.laws],
             not_counted=[*setup.not_counted, *self._not_counted()],
             warnings=[*self._warnings, *(one.failed for one in self._added if one.failed)],
@@ -322,7 +324,7 @@ class Accounts:
     def _quantities(self, ended: Ns) -> Iterator[tuple[str, Quantities]]:
         """Yield each subject with what was observed of it."""
         elapsed = to_seconds(ended)
-        failures = Counter(one.who for one in self._failures)
+        failures = Counter(failure.who for failure in self._failures)
         for name in self._declared:
             ledger = self._components[name]
             joules = ledger.energy(self._processors.get(ledger.processor), self._energy)
@@ -346,7 +348,7 @@ class Accounts:
         delivery = {
             name: parcels.get(words, None if "." in words else 0.0) for name, words in DELIVERY.items()
         }
-        computing = [one for one in energies if one is not None]
+        computing = [energy for energy in energies if energy is not None]
         yield (
             APPLICATION,
             {
@@ -366,11 +368,11 @@ class Accounts:
         """Return, by kind, how many subjects each state was noted of, and the times to it."""
         found: dict[str, Quantities] = {}
         for kind, subjects in self._notes.items():
-            spreads: dict[str, Distribution] = {}
+            spreads: dict[str, DurationStatistics] = {}
             for steps in subjects.values():
                 for state in dict.fromkeys(step.state for step in steps):
                     entered = next(step.at for step in steps if step.state == state)
-                    spreads.setdefault(state, Distribution()).add(entered - steps[0].at)
+                    spreads.setdefault(state, DurationStatistics()).add(entered - steps[0].at)
             found[kind] = {
                 name: value
                 for state, spread in spreads.items()
@@ -394,7 +396,7 @@ class Accounts:
         }
 
     def _response_bounds(self) -> dict[str, Ns | None]:
-        known = {one.name: one for one in self.setup.components}
+        known = {component.name: component for component in self.setup.components}
         bounds = {name: self._demands.bounds(one, known) for name, one in self._processors.items()}
         return {
             name: bounds[one.processor].get(name) for name, one in known.items() if one.processor in bounds
@@ -423,17 +425,17 @@ class Accounts:
         )
 
     def _requirements(self) -> dict[str, RequirementRecord]:
-        units = {one.name: one.unit for one in self.setup.requirements}
+        units = {requirement.name: requirement.unit for requirement in self.setup.requirements}
         found = {
-            one.name: RequirementRecord(
-                observable=one.observable,
-                relation=one.relation,
-                bound=one.bound,
-                unit=one.unit,
+            requirement.name: RequirementRecord(
+                observable=requirement.observable,
+                relation=requirement.relation,
+                bound=requirement.bound,
+                unit=requirement.unit,
                 observed=None,
                 met=None,
             )
-            for one in self.setup.requirements
+            for requirement in self.setup.requirements
         }
         for name, verdict in self._verdicts.items():
             found[name] = RequirementRecord(
@@ -487,7 +489,9 @@ def _history(steps: list[Milestone]) -> NoteRecord:
     return NoteRecord(
         state=steps[-1].state,
         history=[
-            StepRecord(at_s=to_seconds(one.at), state=one.state, component=one.component, detail=one.detail)
-            for one in steps
+            StepRecord(
+                at_s=to_seconds(step.at), state=step.state, component=step.component, detail=step.detail
+            )
+            for step in steps
         ],
     )

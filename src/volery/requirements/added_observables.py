@@ -22,7 +22,7 @@ from volery.trace.attachments import RunSetup
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ObservedQuantity:
     """A quantity that requirements may bound. An empty ``unit`` stands for a count or a share."""
 
     name: str
@@ -46,7 +46,7 @@ class AddedObservables(ABC):
     """
 
     subject: ClassVar[str] = "application"
-    quantities: ClassVar[tuple[Quantity, ...]] = ()
+    quantities: ClassVar[tuple[ObservedQuantity, ...]] = ()
     listens: ClassVar[tuple[type[Any], ...]] = ()
 
     def __init__(self, setup: RunSetup) -> None:
@@ -72,11 +72,11 @@ def subjects_of(setup: RunSetup) -> Mapping[str, tuple[str, ...]]:
     """Return {kind of subject: the names of those in a run}, without operations."""
     return {
         "application": ("application",),
-        "component": tuple(one.name for one in setup.components),
-        "processor": tuple(one.name for one in setup.processors),
-        "vehicle": tuple(one.name for one in setup.vehicles),
-        "chain": tuple(one.name for one in setup.chains),
-        "network": tuple(one.name for one in setup.networks),
+        "component": tuple(component.name for component in setup.components),
+        "processor": tuple(processor.name for processor in setup.processors),
+        "vehicle": tuple(vehicle.name for vehicle in setup.vehicles),
+        "chain": tuple(chain.name for chain in setup.chains),
+        "network": tuple(network.name for network in setup.networks),
     }
 
 
@@ -102,11 +102,11 @@ def _checked(name: str, made: Any) -> type[AddedObservables]:
     elif made.subject not in kinds:
         wrong = f"its subject is {made.subject!r}; there is {choices(kinds)}"
     else:
-        for one in made.quantities:
+        for quantity in made.quantities:
             try:
-                unit(one.unit)
+                unit(quantity.unit)
             except QuantityError as error:
-                wrong = f"the unit of {one.name}: {error}"
+                wrong = f"the unit of {quantity.name}: {error}"
     if wrong:
         raise UsageError(f"the observables {name!r} cannot be used: {wrong}; mend or uninstall the package")
     checked: type[AddedObservables] = made
@@ -156,9 +156,9 @@ class AddedInRun:
     def record(self, at: Ns) -> AddedRecord:
         """Return what they came to in a run that ended at a time."""
         found = {
-            f"{subject}.{one.name}": self.value(subject, one.name, at)
+            f"{subject}.{quantity.name}": self.value(subject, quantity.name, at)
             for subject in self._subjects
-            for one in self._made.quantities
+            for quantity in self._made.quantities
         }
         table = None
         try:

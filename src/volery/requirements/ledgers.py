@@ -61,7 +61,7 @@ Quantities = dict[str, float | None]
 """What was observed of one subject, by the names of the observables; None where nothing was."""
 
 
-class Distribution:
+class DurationStatistics:
     """Count, mean, maximum and quantiles of non-negative durations."""
 
     def __init__(self) -> None:
@@ -150,8 +150,8 @@ class ComponentLedger:
     deadlines: int = 0  # activations with one
     late: int = 0  # releases later than the promised period
     released: Ns = NONE  # the latest release of a component with a period
-    activations: Distribution = field(default_factory=Distribution)
-    calls: Distribution = field(default_factory=Distribution)
+    activations: DurationStatistics = field(default_factory=DurationStatistics)
+    calls: DurationStatistics = field(default_factory=DurationStatistics)
 
     def charge(self, event: Charge) -> None:
         """Add execution time that was charged."""
@@ -226,7 +226,7 @@ class ComponentLedger:
             "energy": energy_j,
         }
 
-    def responses(self) -> Distribution:
+    def responses(self) -> DurationStatistics:
         """Return its response times: a passive component responds to calls, an active one to releases."""
         first, other = (self.activations, self.calls) if self.setup.active else (self.calls, self.activations)
         return first if first.count else other
@@ -249,7 +249,7 @@ def processor_energy(
     processor: ProcessorSetup, ledgers: Iterable[ComponentLedger], elapsed_s: float, law: EnergyLaw
 ) -> float | None:
     """Return joules of a processor over *elapsed_s*, with what is stated of the *ledgers* allocated to it."""
-    here = [one for one in ledgers if one.processor == processor.name]
+    here = [ledger for ledger in ledgers if ledger.processor == processor.name]
     by_law = law(processor, fsum(one.unpriced_s() for one in here), elapsed_s)
     return None if by_law is None else by_law + fsum(one.stated_j for one in here)
 
@@ -305,15 +305,27 @@ class VehicleLedger:
 
     def quantities(self) -> Quantities:
         """Return all that can be observed of it but its collisions."""
-        landings = [one for one in self.operations if one.operation in LANDINGS and one.outcome == OK]
-        travels = [one for one in self.operations if one.operation in TRAVELS and one.outcome == OK]
-        failed = [one for one in self.operations if one.outcome != OK and one.operation != AT_THE_END]
+        landings = [
+            operation
+            for operation in self.operations
+            if operation.operation in LANDINGS and operation.outcome == OK
+        ]
+        travels = [
+            operation
+            for operation in self.operations
+            if operation.operation in TRAVELS and operation.outcome == OK
+        ]
+        failed = [
+            operation
+            for operation in self.operations
+            if operation.outcome != OK and operation.operation != AT_THE_END
+        ]
         observed = self.last is not None
         return {
-            "landing_offset": largest([one.true_horizontal for one in landings]),
-            "goto_error": largest([one.true_horizontal for one in travels]),
-            "goto_error_vertical": largest([one.true_vertical for one in travels]),
-            "goto_error_by_estimate": largest([one.estimate_horizontal for one in travels]),
+            "landing_offset": largest([landing.true_horizontal for landing in landings]),
+            "goto_error": largest([travel.true_horizontal for travel in travels]),
+            "goto_error_vertical": largest([travel.true_vertical for travel in travels]),
+            "goto_error_by_estimate": largest([travel.estimate_horizontal for travel in travels]),
             "battery_min": known(self.least_battery),
             "distance": self.distance if observed else None,
             "airborne_time": to_seconds(self.airborne) if observed else None,
@@ -325,7 +337,7 @@ class VehicleLedger:
 
     def record(self) -> VehicleRecord:
         """Return the record."""
-        done = [one for one in self.operations if one.outcome == OK]
+        done = [operation for operation in self.operations if operation.outcome == OK]
         last = self.last
         return VehicleRecord(
             autopilot=self.setup.autopilot,
@@ -347,7 +359,7 @@ class VehicleLedger:
                 horizontal=largest([one.true_horizontal for one in done]),
                 vertical=largest([one.true_vertical for one in done]),
             ),
-            operations=[_operation(one) for one in self.operations],
+            operations=[_operation(operation) for operation in self.operations],
         )
 
 
@@ -390,7 +402,7 @@ class NetworkLedger:
 
     occupied: Ns = 0
     lost: int = 0
-    delays: Distribution = field(default_factory=Distribution)
+    delays: DurationStatistics = field(default_factory=DurationStatistics)
 
     def transmission(self, event: Transmission) -> None:
         """Add a transmission that arrived or was lost."""
@@ -420,7 +432,7 @@ class ChainLedger:
 
     def __init__(self, setup: ChainSetup) -> None:
         self.setup = setup
-        self.latencies = Distribution()
+        self.latencies = DurationStatistics()
         self._received: list[dict[str, Received]] = [
             {} for _ in setup.topics
         ]  # by topic and node: when, since when

@@ -33,7 +33,7 @@ from volery.requirements.ledgers import (
     TRAVELS,
     ChainLedger,
     ComponentLedger,
-    Distribution,
+    DurationStatistics,
     VehicleLedger,
     linear_energy,
     processor_energy,
@@ -83,7 +83,7 @@ Make = Callable[[str, RunSetup], Observer]
 # -- components
 
 
-def _response(reading: Callable[[Distribution], float | None]) -> Make:
+def _response(reading: Callable[[DurationStatistics], float | None]) -> Make:
     """Observe the responses of a component: see ``ComponentLedger.responses``."""
 
     def make(component: str, setup: RunSetup) -> Observer:
@@ -111,11 +111,11 @@ def _serves(subject: str) -> Callable[[Call], bool]:
     return lambda event: event.callee == component and operation in ("", event.operation.rpartition("/")[2])
 
 
-def _call_times(reading: Callable[[Distribution], float | None]) -> Make:
+def _call_times(reading: Callable[[DurationStatistics], float | None]) -> Make:
     """Observe the calls that a component, or one operation of it, served, as their callers saw them."""
 
     def make(subject: str, setup: RunSetup) -> Observer:
-        mine, spread = _serves(subject), Distribution()
+        mine, spread = _serves(subject), DurationStatistics()
 
         def take(event: Call) -> None:
             if mine(event):
@@ -139,11 +139,11 @@ def _seconds(nanoseconds: float | None) -> float:
     return nan if nanoseconds is None else nanoseconds / S
 
 
-def _largest(spread: Distribution) -> float | None:
+def _largest(spread: DurationStatistics) -> float | None:
     return spread.largest if spread.count else None
 
 
-def _p95(spread: Distribution) -> float | None:
+def _p95(spread: DurationStatistics) -> float | None:
     return spread.quantile(0.95)
 
 
@@ -247,8 +247,10 @@ class _Computing:
     """What energy is computed of: the ledgers of all components, and the processors."""
 
     def __init__(self, setup: RunSetup) -> None:
-        self.ledgers = {one.name: ComponentLedger(one, one.processor) for one in setup.components}
-        self.processors = {one.name: one for one in setup.processors}
+        self.ledgers = {
+            component.name: ComponentLedger(component, component.processor) for component in setup.components
+        }
+        self.processors = {processor.name: processor for processor in setup.processors}
 
     def take(self, event: Slice | Charge) -> None:
         name = event.component
@@ -272,7 +274,7 @@ class _Computing:
 
     def of_all(self, name: str, elapsed_s: float) -> float | None:
         """Return the energy of all processors; None if one of them has no figures."""
-        found = [self.of_processor(one, elapsed_s) for one in self.processors]
+        found = [self.of_processor(processor, elapsed_s) for processor in self.processors]
         return None if None in found or not found else fsum(one for one in found if one is not None)
 
 
@@ -289,9 +291,9 @@ def _network_utilisation(network: str, setup: RunSetup) -> Observer:
     return Observer((Transmission,), take, lambda at: min(1.0, occupied[0] / at) if at else nan)
 
 
-def _delay(reading: Callable[[Distribution], float | None]) -> Make:
+def _delay(reading: Callable[[DurationStatistics], float | None]) -> Make:
     def make(network: str, setup: RunSetup) -> Observer:
-        spread = Distribution()
+        spread = DurationStatistics()
 
         def take(event: Transmission) -> None:
             if event.network == network and event.received != NONE:
@@ -388,7 +390,7 @@ def _noted(kind: str, state: str, quantity: str) -> Observer:
     """
     since: dict[str, Ns] = {}
     entered: dict[str, None] = {}
-    spread = Distribution()
+    spread = DurationStatistics()
 
     def take(event: Milestone) -> None:
         if event.kind == kind:
@@ -420,7 +422,7 @@ def _lost_messages(application: str, setup: RunSetup) -> Observer:
 # -- chains of topics
 
 
-def _latency(reading: Callable[[Distribution], float | None]) -> Make:
+def _latency(reading: Callable[[DurationStatistics], float | None]) -> Make:
     def make(chain: str, setup: RunSetup) -> Observer:
         ledger = ChainLedger(next(one for one in setup.chains if one.name == chain))
         return Observer((Message,), ledger.message, lambda at: _seconds(reading(ledger.latencies)))
@@ -438,7 +440,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "longest response: an active component's activation from release to end, a passive one's call",
         _response(_largest),
     ),
-    ("component", "response_time_mean", "s", "mean response", _response(Distribution.mean)),
+    ("component", "response_time_mean", "s", "mean response", _response(DurationStatistics.mean)),
     (
         "component",
         "response_time_p95",
@@ -471,7 +473,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "longest call that it served, as the caller saw it",
         _call_times(_largest),
     ),
-    ("component", "call_time_mean", "s", "mean call", _call_times(Distribution.mean)),
+    ("component", "call_time_mean", "s", "mean call", _call_times(DurationStatistics.mean)),
     (
         "component",
         "call_time_p95",
@@ -488,7 +490,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         _energy(_Computing.of_component),
     ),
     ("operation", "response_time", "s", "longest call, as the caller saw it", _call_times(_largest)),
-    ("operation", "response_time_mean", "s", "mean call", _call_times(Distribution.mean)),
+    ("operation", "response_time_mean", "s", "mean call", _call_times(DurationStatistics.mean)),
     (
         "operation",
         "response_time_p95",
@@ -508,7 +510,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         _network_utilisation,
     ),
     ("network", "delay", "s", "longest time from the sender's request to the delivery", _delay(_largest)),
-    ("network", "delay_mean", "s", "mean delay", _delay(Distribution.mean)),
+    ("network", "delay_mean", "s", "mean delay", _delay(DurationStatistics.mean)),
     ("network", "delay_p95", "s", "delay that 95 % do not exceed, at most 0.2 % too high", _delay(_p95)),
     ("network", "lost", "", "transmissions that never arrived", _lost_on),
     (
@@ -560,7 +562,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
     ("vehicle", "collisions", "", "how often it hit what stands in the world", _collisions),
     ("vehicle", "failures", "", "operations that did not succeed", _failed_operations),
     ("chain", "latency", "s", "greatest age of data at the end of a chain of topics", _latency(_largest)),
-    ("chain", "latency_mean", "s", "mean age", _latency(Distribution.mean)),
+    ("chain", "latency_mean", "s", "mean age", _latency(DurationStatistics.mean)),
     ("chain", "latency_p95", "s", "age that 95 % do not exceed, at most 0.2 % too high", _latency(_p95)),
     *(
         (
@@ -645,7 +647,7 @@ def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
     kind = _kind(subject, quantity, circumstances)
     make = _MAKERS.get((kind, quantity)) or _added(kind, quantity)
     if make is None or not subject:
-        known = [one.quantity for one in all_observables() if one.subject == kind]
+        known = [observable.quantity for observable in all_observables() if observable.subject == kind]
         raise UsageError(
             f"{expression!r}: {a_kind(kind)} has no quantity {quantity!r}{did_you_mean(quantity, known)}; "
             f"there is {choices(known)}"
@@ -663,8 +665,8 @@ def _added(kind: str, quantity: str) -> Make | None:
 
 def _from_a_package(name: str, made: type[AddedObservables], quantity: str) -> Make:
     def make(subject: str, setup: RunSetup) -> Observer:
-        one = AddedInRun(name, made, setup)
-        return Observer(made.listens, one.take, lambda at: one.value(subject, quantity, at))
+        run = AddedInRun(name, made, setup)
+        return Observer(made.listens, run.take, lambda at: run.value(subject, quantity, at))
 
     return make
 

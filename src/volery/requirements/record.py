@@ -99,7 +99,7 @@ class UnservedRecord(_Part):
     def __str__(self) -> str:
         """Return it as one sentence."""
         since = f"since {self.since_s:.1f} s"
-        who = ", ".join(one.removeprefix("/") for one in self.who.split(", "))
+        who = ", ".join(word.removeprefix("/") for word in self.who.split(", "))
         times = "once" if self.count == 1 else f"{self.count} times"
         said = {
             "publication": f"{self.count} messages by {who} {since}, no node takes them",

@@ -48,7 +48,7 @@ JITTERED_ROW = 64
 
 
 @dataclass(frozen=True)
-class Demand:
+class TaskDemand:
     """The demand of a task.
 
     ``costs`` are the most that 1, 2, ... activations in a row execute, ``spans`` the least times that 2, 3,
@@ -64,7 +64,7 @@ class Demand:
     least_priority: int
 
     @classmethod
-    def periodic(cls, name: str, priority: int, cost: Ns, period: Ns, jitter: Ns = 0) -> Demand:
+    def periodic(cls, name: str, priority: int, cost: Ns, period: Ns, jitter: Ns = 0) -> TaskDemand:
         """Return the demand of activations of *cost*, due a *period* apart, each up to *jitter* late."""
         rows = JITTERED_ROW + jitter // period if jitter else 1
         spans = tuple(max(0, number * period - jitter) for number in range(1, rows + 1))
@@ -89,7 +89,7 @@ class Demand:
 
 
 @dataclass(frozen=True)
-class Load:
+class BackgroundLoad:
     """Execution outside activations: the most in any window of ``WINDOW``, all cores together."""
 
     most: Ns
@@ -100,10 +100,10 @@ class Load:
 
 
 def response_bounds(
-    tasks: Iterable[Demand],
-    loads: Sequence[Load],
+    tasks: Iterable[TaskDemand],
+    loads: Sequence[BackgroundLoad],
     cores: int,
-    executed: Mapping[str, Load] | None = None,
+    executed: Mapping[str, BackgroundLoad] | None = None,
 ) -> dict[str, Ns | None]:
     """Return the bound of each task on a processor, None where none was found.
 
@@ -119,7 +119,9 @@ def response_bounds(
             bounds[task.name] = bound_of(task, OneCore(urgent, loads))
             continue
         known = [(one, bound) for one in urgent if (bound := bounds.get(one.name)) is not None]
-        others = [seen.get(one.name, Load(WINDOW)) for one in urgent if bounds.get(one.name) is None]
+        others = [
+            seen.get(one.name, BackgroundLoad(WINDOW)) for one in urgent if bounds.get(one.name) is None
+        ]
         bounds[task.name] = bound_of(task, ManyCores(known, [*loads, *others], cores))
     return bounds
 
@@ -128,8 +130,8 @@ def response_bounds(
 class OneCore:
     """Interference on one core: more urgent tasks, and loads."""
 
-    urgent: Sequence[Demand]
-    loads: Sequence[Load]
+    urgent: Sequence[TaskDemand]
+    loads: Sequence[BackgroundLoad]
 
     def interference(self, window: Ns, own: Ns) -> Ns:
         """Return the most in a *window* in which the task executes *own*, ns."""
@@ -141,8 +143,8 @@ class OneCore:
 class ManyCores:
     """Interference on several cores: more urgent tasks with their bounds, and loads."""
 
-    urgent: Sequence[tuple[Demand, Ns]]
-    loads: Sequence[Load]
+    urgent: Sequence[tuple[TaskDemand, Ns]]
+    loads: Sequence[BackgroundLoad]
     cores: int
 
     def interference(self, window: Ns, own: Ns) -> Ns:
@@ -153,7 +155,7 @@ class ManyCores:
         return sum(min(one, room) for one in work) // self.cores
 
 
-def bound_of(task: Demand, others: OneCore | ManyCores) -> Ns | None:
+def bound_of(task: TaskDemand, others: OneCore | ManyCores) -> Ns | None:
     """Return the bound of one task, None where none was found."""
     longest = window = steps = 0
     for activations in range(1, MOST_ACTIVATIONS + 1):
@@ -299,7 +301,7 @@ class Demands:
         if processor.scheduler != FIXED_PRIORITY:
             return {}
         here = {name: where[processor.name] for name, where in self._work.items() if processor.name in where}
-        executed = {name: Load(work.most) for name, work in here.items()}
+        executed = {name: BackgroundLoad(work.most) for name, work in here.items()}
         known = {
             name: demand
             for name, work in here.items()
@@ -321,7 +323,7 @@ class Demands:
     def _broken(self, name: str, bound: Ns) -> bool:
         return bound < self._releases[name].longest
 
-    def _demand(self, name: str, work: _Work, components: dict[str, ComponentSetup]) -> Demand | None:
+    def _demand(self, name: str, work: _Work, components: dict[str, ComponentSetup]) -> TaskDemand | None:
         """Return the demand of a task, None for too few activations or several processors."""
         setup, releases = components.get(name), self._releases.get(name)
         if setup is None or releases is None or len(self._work[name]) > 1 or not any(work.costs):
@@ -331,4 +333,4 @@ class Demands:
             return None
         visited = [one for place in work.places if (one := components.get(place)) is not None]
         priorities = [setup.priority, *(one.priority for one in visited if one.active)]
-        return Demand(name, max(priorities), tuple(work.costs), spans, min(priorities))
+        return TaskDemand(name, max(priorities), tuple(work.costs), spans, min(priorities))

@@ -7,23 +7,30 @@ from math import isnan
 from typing import Any
 
 from volery.base.time import Ns
-from volery.model.system import Bound
+from volery.model.system import RequiredBound
 from volery.requirements.observables import make_observer
 from volery.trace.attachments import RunSetup
 from volery.trace.events import Event, Record, Verdict
 
 
-def bounds_of(setup: RunSetup) -> tuple[Bound, ...]:
+def bounds_of(setup: RunSetup) -> tuple[RequiredBound, ...]:
     """Return the requirements of a run whose trace was read back."""
     return tuple(
-        Bound(one.name, one.observable, one.relation, one.bound, one.unit) for one in setup.requirements
+        RequiredBound(
+            requirement.name,
+            requirement.observable,
+            requirement.relation,
+            requirement.bound,
+            requirement.unit,
+        )
+        for requirement in setup.requirements
     )
 
 
 class Observers:
     """A selective listener of the event stream that observes what *bounds* are about."""
 
-    def __init__(self, bounds: Iterable[Bound], setup: RunSetup | None = None) -> None:
+    def __init__(self, bounds: Iterable[RequiredBound], setup: RunSetup | None = None) -> None:
         self._observed = [(bound, make_observer(bound.observe, setup)) for bound in bounds]
         self._listening: dict[type[Any], list[Callable[[Any], None]]] = {}
         for _, observer in self._observed:
@@ -40,7 +47,7 @@ class Observers:
         takers = self._listening.get(kind, [])
         return takers[0] if len(takers) == 1 else self if takers else None
 
-    def values(self, at: Ns) -> Iterator[tuple[Bound, float]]:
+    def values(self, at: Ns) -> Iterator[tuple[RequiredBound, float]]:
         """Yield each bound with what was observed until *at*; NaN where nothing was observed."""
         for bound, observer in self._observed:
             yield bound, observer.value(at)
@@ -54,7 +61,7 @@ class Observers:
         return all(bound.holds(value) for bound, value in self.values(at))
 
 
-def judge(bound: Bound, observed: float, at: Ns) -> Verdict:
+def judge(bound: RequiredBound, observed: float, at: Ns) -> Verdict:
     """Return the verdict on one bound. A quantity that could not be observed does not meet it."""
     met = not isnan(observed) and bound.holds(observed)
     return Verdict(at, bound.name, bound.observe, bound.relation, bound.bound, observed, met)

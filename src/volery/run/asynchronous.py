@@ -27,7 +27,7 @@ LOOKED_AFTER: Ns = 20 * MS
 
 
 @dataclass
-class _Call:
+class _AwaitedCall:
     """One call of a program: what to execute, and the future that it awaits."""
 
     body: Callable[[], Any]
@@ -51,7 +51,7 @@ class AsyncVehicle:
     """
 
     def __init__(
-        self, calls: SimpleQueue[_Call | None], loop: asyncio.AbstractEventLoop, kind: type[Vehicle]
+        self, calls: SimpleQueue[_AwaitedCall | None], loop: asyncio.AbstractEventLoop, kind: type[Vehicle]
     ) -> None:
         self._calls = calls
         self._loop = loop
@@ -95,7 +95,7 @@ class AsyncVehicle:
 
     async def run(self, function: Callable[[Any], Any]) -> Any:
         """Execute ``function(vehicle)`` and return what it returns."""
-        call = _Call(lambda: function(self._vehicle), self._loop.create_future())
+        call = _AwaitedCall(lambda: function(self._vehicle), self._loop.create_future())
         self._calls.put(call)
         try:
             return await call.future
@@ -117,7 +117,7 @@ async def connect_async(url: str, kind: type[Vehicle] = Drone, **options: Any) -
         VoleryError: As for ``connect``.
     """
     loop = asyncio.get_running_loop()
-    calls: SimpleQueue[_Call | None] = SimpleQueue()
+    calls: SimpleQueue[_AwaitedCall | None] = SimpleQueue()
     vehicle = AsyncVehicle(calls, loop, kind)
     opened: asyncio.Future[None] = loop.create_future()
     closed: asyncio.Future[None] = loop.create_future()
@@ -147,12 +147,12 @@ class _Executor:
     """Executes the calls of one program in the thread of its kernel."""
 
     def __init__(
-        self, vehicle: Vehicle, loop: asyncio.AbstractEventLoop, calls: SimpleQueue[_Call | None]
+        self, vehicle: Vehicle, loop: asyncio.AbstractEventLoop, calls: SimpleQueue[_AwaitedCall | None]
     ) -> None:
         self._kernel = vehicle.kernel
         self._loop = loop
         self._calls = calls
-        self._running: list[_Call] = []
+        self._running: list[_AwaitedCall] = []
         self._ended = Signal(vehicle.kernel, f"a call of {vehicle.name}")
         self._closing = False
 
@@ -184,7 +184,7 @@ class _Executor:
     def _has_ended(self) -> bool:
         return any(call.task is not None and call.task.done for call in self._running)
 
-    def _start(self, call: _Call) -> None:
+    def _start(self, call: _AwaitedCall) -> None:
         def body() -> None:
             try:
                 result, failure = call.body(), None

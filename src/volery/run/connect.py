@@ -175,7 +175,7 @@ def connect_fleet(
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
         fleet.each(lambda vehicle: vehicle.wait_located(within, _teller(opened)), "know where they are")
-        defended = {one.name: _defended(one, if_killed) for one in opened.vehicles}
+        defended = {vehicle.name: _defended(vehicle, if_killed) for vehicle in opened.vehicles}
         opening.enter_context(
             _ending(lambda: fleet.each(lambda one: defended[one.name].come_to_rest(), "come to rest"))
         )

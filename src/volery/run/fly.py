@@ -135,8 +135,12 @@ class _Flight:
         self._ending = Ending(kernel)
         self._defences: dict[str, LastDefence] = {}
         if options.if_killed is not None:
-            self._defences = {one.name: LastDefence(one, options.if_killed) for one in self._opened.vehicles}
-        self._ending.vehicles = [self._defences.get(one.name, one) for one in self._opened.vehicles]
+            self._defences = {
+                vehicle.name: LastDefence(vehicle, options.if_killed) for vehicle in self._opened.vehicles
+            }
+        self._ending.vehicles = [
+            self._defences.get(vehicle.name, vehicle) for vehicle in self._opened.vehicles
+        ]
         setup, attachments = self._setup(urls, options.seed)
         self._recording = Recording(setup, options.folder, attachments, traced=options.traced)
         kernel.record = self._recording.stream
@@ -187,7 +191,7 @@ class _Flight:
         )
         fidelity = "hardware"
         if opened.fleet is not None:
-            fidelity = "firmware" if any(one.firmware for one in vehicles) else "code"
+            fidelity = "firmware" if any(vehicle.firmware for vehicle in vehicles) else "code"
         setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
         attachments = []
         if opened.fleet is not None:

@@ -17,7 +17,7 @@ from typing import Any
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, from_seconds
 from volery.control.laws import PidGains, PidLaw
-from volery.control.manoeuvres import Manoeuvre, set_gains
+from volery.control.manoeuvres import LawManoeuvre, set_gains
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.ros.graph import Node
@@ -30,7 +30,7 @@ AS_PARAMETERS = ("kp", "ki", "kd", "filter_s", "slew", "deceleration")
 """Gains that are parameters of the node, those of them that are finite."""
 
 
-def loops_of(manoeuvre: Manoeuvre) -> dict[str, PidGains]:
+def loops_of(manoeuvre: LawManoeuvre) -> dict[str, PidGains]:
     """Return the present gains of the PID laws by loop."""
     return {name: law.gains for name, law in manoeuvre.laws.items() if isinstance(law, PidLaw)}
 
@@ -65,7 +65,7 @@ def check_gains(stated: Mapping[str, Any], loops: Mapping[str, PidGains], source
     Raises:
         UsageError: a loop, a field or a value is none.
     """
-    known = {one.name for one in fields(PidGains)}
+    known = {field.name for field in fields(PidGains)}
     found: dict[str, PidGains] = {}
     for loop, table in stated.items():
         if loop not in loops:
@@ -73,7 +73,7 @@ def check_gains(stated: Mapping[str, Any], loops: Mapping[str, PidGains], source
             raise UsageError(f"{source}: no loop {loop!r}{hint}; there is {choices(tuple(loops))}")
         if not isinstance(table, dict):
             raise UsageError(f"{source}: {loop} is {table!r}; write a table, such as [{loop}] and kp = 2.0")
-        values = {one.name: getattr(loops[loop], one.name) for one in fields(PidGains)}
+        values = {field.name: getattr(loops[loop], field.name) for field in fields(PidGains)}
         for name, value in table.items():
             if name not in known or not isinstance(value, bool | int | float):
                 hint = did_you_mean(name, tuple(known))
@@ -86,7 +86,9 @@ def check_gains(stated: Mapping[str, Any], loops: Mapping[str, PidGains], source
     return found
 
 
-def _change(manoeuvre: Manoeuvre, drone: Drone, read: Callable[[], dict[str, PidGains]], source: str) -> None:
+def _change(
+    manoeuvre: LawManoeuvre, drone: Drone, read: Callable[[], dict[str, PidGains]], source: str
+) -> None:
     """Use the gains that *read* returns; if they are wrong, the gains remain, and the record states why."""
     try:
         for loop, gains in read().items():
@@ -108,7 +110,7 @@ class GainsFile:
         UsageError: the file is wrong.
     """
 
-    def __init__(self, path: Path, manoeuvre: Manoeuvre) -> None:
+    def __init__(self, path: Path, manoeuvre: LawManoeuvre) -> None:
         self._path, self._manoeuvre = path, manoeuvre
         self._loops = loops_of(manoeuvre)
         self._text = path.read_bytes() if path.is_file() else b""
@@ -149,7 +151,7 @@ class GainParameters:
         UsageError: parameters that were set before are no gains.
     """
 
-    def __init__(self, node: Node, manoeuvre: Manoeuvre) -> None:
+    def __init__(self, node: Node, manoeuvre: LawManoeuvre) -> None:
         self._node, self._manoeuvre = node, manoeuvre
         self._loops = loops_of(manoeuvre)
         self._open = True

@@ -16,7 +16,7 @@ from volery.base.time import Ns
 from volery.control.actuation import Actuation, AttitudeSetpoints, RcOverride, VelocitySetpoints
 from volery.control.flight import PERIOD, ControlledFlight
 from volery.control.link_failsafes import BY_STICKS, link_failsafes
-from volery.control.manoeuvres import Manoeuvre
+from volery.control.manoeuvres import LawManoeuvre
 from volery.control.safety_switch import SwitchSettings
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
 from volery.run.fly import fly
@@ -105,7 +105,7 @@ def with_rates(url: str, switch: SwitchSettings | None) -> str:
 
 
 def go(
-    make: Callable[[], Manoeuvre],
+    make: Callable[[], LawManoeuvre],
     on: str,
     settings: GoSettings,
     options: Options,
@@ -160,7 +160,7 @@ def go(
 
 
 @contextmanager
-def _gain_parameters(name: str, drone: Drone, manoeuvre: Manoeuvre) -> Iterator[Collection[str]]:
+def _gain_parameters(name: str, drone: Drone, manoeuvre: LawManoeuvre) -> Iterator[Collection[str]]:
     """Let the gains be parameters of a node on the graph *name*; yield the loops that were set before."""
     if not name:
         yield ()

@@ -65,22 +65,22 @@ def node_arguments(words: Sequence[str]) -> NodeArguments:
         UsageError: A file of parameters cannot be read.
     """
     ros_2 = ROS_2 in words
-    if not ros_2 and not any(":=" in one for one in words):
+    if not ros_2 and not any(":=" in word for word in words):
         return NodeArguments(tuple(words))
     ros = 2 if ros_2 else 1
     above = os.environ.get("ROS_NAMESPACE", "") if ros == 1 else ""  # where roslaunch states it
     launch = Launch(joined("/", above)).given(words, ros)
-    made = NodeArguments(
+    arguments = NodeArguments(
         tuple(_own(words, ros)), launch.node_name, launch.namespace, launch.parameters, launch.remaps, ros
     )
     parameters: dict[str, Any] = {}
     for file in _parameter_files(words) if ros_2 else ():
         try:
-            own, _ = parameters_of(Path(file), made.full_name())
+            own, _ = parameters_of(Path(file), arguments.full_name())
             parameters |= own
         except UnresolvedError as error:
             raise UsageError(f"{_PARAMETER_FILE} {file}: {error}") from None
-    return replace(made, parameters={**parameters, **launch.parameters})
+    return replace(arguments, parameters={**parameters, **launch.parameters})
 
 
 def with_server_parameters(given: NodeArguments) -> NodeArguments:

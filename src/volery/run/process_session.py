@@ -39,7 +39,7 @@ from volery.kernel.virtual import Pacer
 from volery.model.builder import ModelBuilder
 from volery.model.system import System
 from volery.run.ending import FOREVER
-from volery.run.result import DEFAULT_OPTIONS, Options, Progress, Run, VehicleProgress
+from volery.run.result import DEFAULT_OPTIONS, Options, Run, RunProgress, VehicleProgress
 from volery.run.run_session import RunSession, check_fidelity, check_step, read_system
 from volery.run.supervision import how_ended, recover_by, recover_run, supervision_of
 from volery.trace.events import Event as TraceEvent
@@ -116,7 +116,7 @@ class ProcessRunSession:
         self._libraries: dict[str, Path] = {}
         self._listeners: dict[type[Any], tuple[Record, ...]] = {}
         if options.show is not None:
-            self._listeners[Progress] = (options.show,)
+            self._listeners[RunProgress] = (options.show,)
         if options.tell is not None:
             self._listeners[str] = (options.tell,)
         self._tapping = Lock()

@@ -37,7 +37,7 @@ class VehicleProgress:
 
 
 @dataclass(frozen=True)
-class Progress:
+class RunProgress:
     """Present state of a run.
 
     ``limit`` is its latest end or 0, ``notes`` the number of noted subjects by kind and present state.
@@ -52,7 +52,7 @@ class Progress:
 ReadVehicles = Callable[[], tuple[VehicleProgress, ...]]
 """Returns the present state of the vehicles."""
 
-Show = Callable[[Progress], None]
+Show = Callable[[RunProgress], None]
 """Called about once a simulated second. It must not block."""
 
 
@@ -159,7 +159,7 @@ class ProgressReporter:
 
     def _report(self) -> None:
         notes = {kind: dict(Counter(states.values())) for kind, states in self._notes.items()}
-        self._show(Progress(self._kernel.now(), self._limit, self._read(), notes))
+        self._show(RunProgress(self._kernel.now(), self._limit, self._read(), notes))
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ FULL, TRACE, SUMMARY, NOTHING = "full", "trace", "summary", "none"
 def check_record(record: str, levels: Collection[str], option: str = "record") -> None:
     """Raise ``UsageError`` unless *record* is one of *levels* or names topics: ``/scan,/camera/image``."""
     names = record.split(",")
-    if record not in levels and not all(one.startswith("/") and one.strip("/ ") for one in names):
+    if record not in levels and not all(name.startswith("/") and name.strip("/ ") for name in names):
         what = f"there is {choices(levels)}, or names of topics as /camera/image_raw,/scan"
         raise UsageError(f"{option} {record}: {what}")
 

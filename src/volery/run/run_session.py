@@ -19,7 +19,7 @@ from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
 from volery.ros.graph.graph_context import Recorded
 from volery.run.assembly.component_builder import Builder, BuiltComponents, with_executables
-from volery.run.assembly.computers import Platform, PowerFeed
+from volery.run.assembly.computers import ComputingPlatform, PowerFeed
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.firmware_programs import ProgramFolder, on_real_firmware
 from volery.run.assembly.model_checks import vocabulary
@@ -98,9 +98,10 @@ def _on_real_firmware(system: System) -> tuple[System, tuple[str, ...]]:
     """Return a model whose vehicles fly on real firmware, and why some do not."""
     vehicles = on_real_firmware(system.vehicles)
     remarks = tuple(
-        f"{one.name} flies on the simulated {one.autopilot}: no real firmware of it flies in virtual time"
-        for one in vehicles
-        if one.firmware is None
+        f"{vehicle.name} flies on the simulated {vehicle.autopilot}: "
+        "no real firmware of it flies in virtual time"
+        for vehicle in vehicles
+        if vehicle.firmware is None
     )
     return replace(system, environment=replace(system.environment, vehicles=vehicles)), remarks
 
@@ -266,16 +267,16 @@ class RunSession:
 
     # -- parts
 
-    def _platform(self) -> Platform:
+    def _platform(self) -> ComputingPlatform:
         options = self._options
-        platform = Platform(self._system, self._kernel, options.seed, options.fidelity)
+        platform = ComputingPlatform(self._system, self._kernel, options.seed, options.fidelity)
         platform.look_up_prices()
         return platform
 
-    def _setup(self, platform: Platform) -> RunSetup:
+    def _setup(self, platform: ComputingPlatform) -> RunSetup:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
-    def _build(self, platform: Platform) -> BuiltComponents:
+    def _build(self, platform: ComputingPlatform) -> BuiltComponents:
         options = self._options
         builder = Builder(
             self._system, self._kernel, platform, self._fleet, self._ending, records=self._recorded
@@ -317,7 +318,7 @@ class RunSession:
         self._recording.stream.tap(self._observers)
         if options.log is not None:
             self._recording.log_into(options.log)
-        self._log = ComponentLogReporter([one.name for one in system.instances], options.tell)
+        self._log = ComponentLogReporter([instance.name for instance in system.instances], options.tell)
         self._recording.stream.tap(self._log)
         if system.limits.until is not None:
             self._goal = Observers((system.limits.until,), setup)
@@ -407,16 +408,16 @@ class GraphSession(RunSession):
             self._unjudged |= dict.fromkeys(unjudged, NO_TRUTH)
         super().__init__(system, options)
 
-    def _platform(self) -> Platform:
+    def _platform(self) -> ComputingPlatform:
         host = HostPlatform(self._system, self._kernel, self._options.seed, self._options.fidelity)
         for name, why in self._unjudged.items():
             host.warnings[f"the requirement {name!r} is not judged: {why}"] = None
         return host
 
-    def _setup(self, platform: Platform) -> RunSetup:
+    def _setup(self, platform: ComputingPlatform) -> RunSetup:
         return setup_of(unallocated(self._system), platform, self._options.seed, self._options.fidelity)
 
-    def _build(self, platform: Platform) -> BuiltComponents:
+    def _build(self, platform: ComputingPlatform) -> BuiltComponents:
         options = self._options
         assert options.pace is not None, "set above"
         self._distributed = DistributedRun(

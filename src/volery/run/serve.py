@@ -9,7 +9,7 @@ from volery.base.errors import UsageError
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded_link import CodedLink
-from volery.links.link import Codec
+from volery.links.link import WireFormat
 from volery.links.mavlink_codec import MAVLINK
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
@@ -70,7 +70,7 @@ class VehicleServer:
             self.links.append(link)
             self._autopilot.connect(link, use=use)
 
-    def _open(self, address: Address, place: int, codec: Codec, *, usual: bool) -> CodedLink:
+    def _open(self, address: Address, place: int, codec: WireFormat, *, usual: bool) -> CodedLink:
         """Open a link.
 
         A usual MAVLink address falls back to any local port where its own is in use; a ground station of

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from volery.base.errors import UsageError, choices
 from volery.base.time import Ns
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.model.system import System
 from volery.run.assembly.simulated_fleet import OutsideAutopilot
 from volery.run.result import Options, Tell
@@ -67,7 +67,7 @@ class ServedVehicle(NamedTuple):
 
 def bare_world(system: System, duration: Ns | None) -> System:
     """Return a model without what needs components: vehicles and computers, which idle, stay."""
-    vehicles = tuple(replace(one, processor=None, firmware=None) for one in system.vehicles)
+    vehicles = tuple(replace(vehicle, processor=None, firmware=None) for vehicle in system.vehicles)
     return replace(
         system,
         instances=(),
@@ -96,7 +96,7 @@ class WorldSession(RunSession):
         self, system: System, options: Options, ports: WorldPorts, duration: Ns | None, tell: Tell
     ) -> None:
         self._ports, self._report = ports, tell
-        names = [one.name for one in system.vehicles]
+        names = [vehicle.name for vehicle in system.vehicles]
         if not names:
             raise UsageError(f"{system.name} has no vehicle; add one below environment.vehicles of the model")
         if ports.only and ports.only not in names:
@@ -110,10 +110,10 @@ class WorldSession(RunSession):
         """The vehicles that programs fly."""
 
     def _outside(self) -> Mapping[str, OutsideAutopilot]:
-        wanted = [one for one in self._system.vehicles if self._ports.only in ("", one.name)]
+        wanted = [vehicle for vehicle in self._system.vehicles if self._ports.only in ("", vehicle.name)]
         return {one.name: self._open(place, one) for place, one in enumerate(wanted)}
 
-    def _open(self, instance: int, vehicle: Vehicle) -> OutsideAutopilot:
+    def _open(self, instance: int, vehicle: VehicleSpec) -> OutsideAutopilot:
         host, rate = self._ports.host, self._ports.rate
         number = self._ports.first + STRIDE * instance
         port = QuestionPort(vehicle.name, host, number, self._report, lambda: self._ending.signalled)

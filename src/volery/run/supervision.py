@@ -28,15 +28,15 @@ from volery.components.cpp.framework import Crash, framework_runtime, read_crash
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
 from volery.requirements.verdicts import Observers
-from volery.run.assembly.computers import Platform
+from volery.run.assembly.computers import ComputingPlatform
 from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.recording import Recording
-from volery.run.result import Options, Progress, Run, Show, Tell
+from volery.run.result import Options, Run, RunProgress, Show, Tell
 from volery.run.run_session import PATIENCE_S
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.events import Event, Failure, Verdict
 from volery.trace.mcap_writer import TRACE_FILE
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 Work = Callable[[Show | None, Tell | None], Run]
 """Executes the run, given the functions that show its progress and its lines."""
@@ -184,7 +184,7 @@ def _child_main(
         signal.signal(number, signal.default_int_handler)
     supervision.begin(crash_pipe)
 
-    def show(progress: Progress) -> None:
+    def show(progress: RunProgress) -> None:
         to.send(("show", progress))
 
     def tell(line: str) -> None:
@@ -217,7 +217,7 @@ def recover_run(system: System, options: Options, reached: Ns, error: VoleryErro
         blamed: Component that failed, or ``run``.
     """
     cut = _set_aside(options.folder) if options.folder is not None else None
-    platform = Platform(system, VirtualKernel(), options.seed, options.fidelity)
+    platform = ComputingPlatform(system, VirtualKernel(), options.seed, options.fidelity)
     platform.look_up_prices()
     setup = setup_of(system, platform, options.seed, options.fidelity)
     recording = Recording(setup, options.folder, attachments_of(system), traced=options.traced)
@@ -252,7 +252,7 @@ def _events(cut: Path | None) -> Iterator[Event]:
     if cut is None:
         return
     try:
-        with Reading(cut) as reading:
+        with OpenTrace(cut) as reading:
             yield from (event for event in reading.events() if not isinstance(event, Verdict))
     except UsageError:
         return

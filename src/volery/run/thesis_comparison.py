@@ -14,13 +14,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.base.time import MS
-from volery.control.actuation import RC_SCALES, Actuation, Command, Measured, RcOverride, thesis_scale
+from volery.control.actuation import (
+    RC_SCALES,
+    Actuation,
+    MeasuredState,
+    MotionCommand,
+    RcOverride,
+    thesis_scale,
+)
 from volery.control.flight import ControlledFlight
 from volery.control.laws import wrap
 from volery.control.log_signals import read_signals
 from volery.control.manoeuvres import YAW_LAWS, Rotation
-from volery.control.step_response import Signal, StepResponse, step_responses
-from volery.control.vehicle_answer import Answer
+from volery.control.step_response import ControlledSignal, StepResponse, step_responses
+from volery.control.vehicle_answer import LoopAnswer
 from volery.run.fly import fly
 from volery.run.result import Options
 from volery.vehicles import Drone
@@ -53,11 +60,11 @@ THESIS = (
 )
 
 
-class Flown(NamedTuple):
+class FlownLaw(NamedTuple):
     """One law: its record, and the response to each step in the order of ``STEPS``."""
 
     law: str
-    signal: Signal
+    signal: ControlledSignal
     responses: Sequence[StepResponse]
 
 
@@ -77,7 +84,7 @@ class _Push:
         self.take_off, self.engage = inner.take_off, inner.engage
 
     @property
-    def answer(self) -> Answer | None:
+    def answer(self) -> LoopAnswer | None:
         """None: a law that is pushed is not watched."""
         return None
 
@@ -86,7 +93,7 @@ class _Push:
         """Turn in degrees that is still to come."""
         return self._inner.lead
 
-    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+    def apply(self, command: MotionCommand, measured: MeasuredState, sample_s: float) -> None:
         """Apply a command, or the push."""
         self._elapsed += sample_s
         if self._elapsed >= self._at and not self._over:
@@ -100,7 +107,7 @@ class _Push:
 
 def fly_thesis_comparison(
     folder: Path, laws: Sequence[str] = tuple(YAW_LAWS), on: str = ADDRESS, seed: int = 1
-) -> list[Flown]:
+) -> list[FlownLaw]:
     """Fly each law and return its responses.
 
     Args:
@@ -115,7 +122,7 @@ def fly_thesis_comparison(
     return [_fly(law, folder / law, on, seed) for law in laws]
 
 
-def _fly(law: str, folder: Path, on: str, seed: int) -> Flown:
+def _fly(law: str, folder: Path, on: str, seed: int) -> FlownLaw:
     headings = [0.0]
     for step in STEPS:
         headings.append((headings[-1] + step) % 360.0)
@@ -135,9 +142,9 @@ def _fly(law: str, folder: Path, on: str, seed: int) -> Flown:
     run = fly(mission, address, Options(out=folder, seed=seed))
     if not run.completed:
         raise run.error or KeyboardInterrupt  # a signal ends this flight, and with it the series
-    (signal,) = (one for one in read_signals(folder) if one.name == "yaw")
-    responses = [one for one in step_responses(signal) if abs(one.size) > STEPS[0] / 2.0]
-    return Flown(law, replace(signal, controller=law), responses[-len(STEPS) :])
+    (signal,) = (signal for signal in read_signals(folder) if signal.name == "yaw")
+    responses = [response for response in step_responses(signal) if abs(response.size) > STEPS[0] / 2.0]
+    return FlownLaw(law, replace(signal, controller=law), responses[-len(STEPS) :])
 
 
 OFFSET = (

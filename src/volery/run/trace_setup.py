@@ -7,10 +7,10 @@ from pathlib import Path
 
 from volery.cost import NOT_COUNTED, Basis, ProcessorPrices
 from volery.model.components import CPP_LANGUAGES
-from volery.model.environment import Environment, Prism, Vehicle, Ways
+from volery.model.environment import Environment, Prism, VehicleSpec, Ways
 from volery.model.instances import Instance
-from volery.model.system import Processor, System
-from volery.run.assembly.computers import Platform
+from volery.model.system import ProcessorSpec, System
+from volery.run.assembly.computers import ComputingPlatform
 from volery.run.assembly.cpp import core_of
 from volery.run.assembly.vehicle_nodes import node_name
 from volery.trace.attachments import (
@@ -41,7 +41,7 @@ ALWAYS_LEFT_OUT = (
 """Costs that no figure of a run includes."""
 
 
-def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> RunSetup:
+def setup_of(system: System, platform: ComputingPlatform, seed: int, fidelity: str) -> RunSetup:
     """Return the setup of a simulation of *system*."""
     return RunSetup(
         system=system.name,
@@ -54,12 +54,18 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
             *_vehicle_nodes(system),
         ),
         processors=tuple(_processor(model, platform.prices[model.name]) for model in system.processors),
-        networks=tuple(NetworkSetup(one.name) for one in system.networks),
-        vehicles=tuple(_vehicle(one) for one in system.vehicles),
-        chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
+        networks=tuple(NetworkSetup(network.name) for network in system.networks),
+        vehicles=tuple(_vehicle(vehicle) for vehicle in system.vehicles),
+        chains=tuple(ChainSetup(chain.name, chain.topics) for chain in system.chains),
         requirements=tuple(
-            RequirementSetup(one.name, one.observe, one.relation, one.bound, one.unit)
-            for one in system.requirements
+            RequirementSetup(
+                requirement.name,
+                requirement.observe,
+                requirement.relation,
+                requirement.bound,
+                requirement.unit,
+            )
+            for requirement in system.requirements
         ),
         laws=tuple(_laws(system, platform, fidelity)),
         not_counted=(*NOT_COUNTED, *ALWAYS_LEFT_OUT, *_missing_networks(system)),
@@ -81,7 +87,7 @@ def _component(instance: Instance) -> ComponentSetup:
     )
 
 
-def _vehicle(vehicle: Vehicle) -> VehicleSetup:
+def _vehicle(vehicle: VehicleSpec) -> VehicleSetup:
     firmware = Path(vehicle.firmware.program).name if vehicle.firmware else ""
     return VehicleSetup(vehicle.name, vehicle.autopilot, vehicle.kind, firmware)
 
@@ -96,7 +102,7 @@ def _vehicle_nodes(system: System) -> Iterable[ComponentSetup]:
             yield ComponentSetup(node_name(vehicle.name), "MAVROS", "roscpp", vehicle.processor, active=True)
 
 
-def _processor(model: Processor, prices: ProcessorPrices) -> ProcessorSetup:
+def _processor(model: ProcessorSpec, prices: ProcessorPrices) -> ProcessorSetup:
     power = prices.entry.power
     return ProcessorSetup(
         name=model.name,
@@ -110,11 +116,11 @@ def _processor(model: Processor, prices: ProcessorPrices) -> ProcessorSetup:
     )
 
 
-def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetup]:
+def _laws(system: System, platform: ComputingPlatform, fidelity: str) -> Iterable[LawSetup]:
     """Yield one entry for each kind of processor and law, whatever the number of computers of that kind."""
-    first: dict[str, Processor] = {}
-    for one in system.processors:
-        first.setdefault(one.kind, one)
+    first: dict[str, ProcessorSpec] = {}
+    for processor in system.processors:
+        first.setdefault(processor.kind, processor)
     for kind, model in first.items():
         prices = platform.prices[model.name]
         code = _code_bases(system, prices, kind) if fidelity != "times" else ()
@@ -124,8 +130,12 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
 
 def _code_bases(system: System, prices: ProcessorPrices, kind: str) -> Iterable[Basis]:
     """Yield the laws of counted code that apply to at least one component."""
-    kinds = {one.name: one.kind for one in system.processors}
-    there = [one for one in system.instances if kinds.get(one.processor or "") == kind and one.component.path]
+    kinds = {processor.name: processor.kind for processor in system.processors}
+    there = [
+        instance
+        for instance in system.instances
+        if kinds.get(instance.processor or "") == kind and instance.component.path
+    ]
     if any(one.component.language not in CPP_LANGUAGES for one in there):
         yield from prices.code_basis()
     if any(core_of(system, "code", one) for one in there):

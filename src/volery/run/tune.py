@@ -19,7 +19,7 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, to_seconds
 from volery.control.flight import PERIOD
 from volery.control.laws import DEGREES, OnOffGains, OnOffLaw, PidGains, PidLaw, wrap
-from volery.control.manoeuvres import HEIGHT_GAINS, YAW_GAINS, Altitude, Manoeuvre, Rotation
+from volery.control.manoeuvres import HEIGHT_GAINS, YAW_GAINS, Altitude, LawManoeuvre, Rotation
 from volery.control.step_response import Array, StepResponse, make_signal, step_responses
 from volery.control.tuning import (
     Margins,
@@ -53,7 +53,7 @@ TUNED = ("kp", "ki", "kd", "deceleration")
 WIDER = (1.0, 4.0, 4.0, 1.0)
 """Factors of the spread by gain: integral and derivative matter less."""
 
-Make = Callable[[PidGains, Sequence[float]], Manoeuvre]
+Make = Callable[[PidGains, Sequence[float]], LawManoeuvre]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Loop:
 
     name: str
     relay: OnOffGains
-    experiment: Callable[[OnOffLaw], Manoeuvre]
+    experiment: Callable[[OnOffLaw], LawManoeuvre]
     flown: Make
     hand: PidGains
     steps: Sequence[float]
@@ -183,7 +183,7 @@ class Judged(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tuning:
+class TuningResult:
     """Result of ``tune``: the process, and the gains by hand, by rule and by optimisation, in this order."""
 
     loop: Loop
@@ -197,7 +197,9 @@ class Tuning:
         return self.judged[-1].gains
 
 
-def tune(what: str, on: str, settings: GoSettings, options: Options, tell: Tell = lambda _: None) -> Tuning:
+def tune(
+    what: str, on: str, settings: GoSettings, options: Options, tell: Tell = lambda _: None
+) -> TuningResult:
     """Tune a loop on a vehicle.
 
     Args:
@@ -236,17 +238,17 @@ def tune(what: str, on: str, settings: GoSettings, options: Options, tell: Tell 
             found = flights(gains, flown_scenarios(loop, HELD_BACK_FLIGHTS, options.seed + HELD_BACK_SEED))
         modelled = float(cost(gains, process, held_back, loop.seconds)[0])
         judged.append(Judged(name, gains, margins(gains, process, SAMPLE_S), modelled, *found))
-    return Tuning(loop, oscillation, process, tuple(judged))
+    return TuningResult(loop, oscillation, process, tuple(judged))
 
 
-class Flown(NamedTuple):
+class FlownGains(NamedTuple):
     """Mean IAE per unit of step in s, and greatest overshoot as a share of its step."""
 
     iae: float
     overshoot: float
 
 
-NOT_FLOWN = Flown(nan, nan)
+NOT_FLOWN = FlownGains(nan, nan)
 
 
 class _Flights:
@@ -255,10 +257,10 @@ class _Flights:
     def __init__(self, loop: Loop, on: str, settings: GoSettings) -> None:
         self._loop, self._on, self._settings = loop, on, settings
 
-    def __call__(self, gains: PidGains, tests: Sequence[FlownScenario]) -> Flown:
+    def __call__(self, gains: PidGains, tests: Sequence[FlownScenario]) -> FlownGains:
         """Return the figures over all steps of all flights."""
-        found = [one for test in tests for one in self._responses(gains, test)]
-        return Flown(
+        found = [response for test in tests for response in self._responses(gains, test)]
+        return FlownGains(
             float(np.mean([one.iae / abs(one.size) for one in found])),
             max(one.overshoot_share for one in found),
         )
@@ -312,7 +314,9 @@ def _near(best: PidGains, process: Process, random: np.random.Generator) -> PidG
             return gains
 
 
-def _fly(make: Callable[[], Manoeuvre], on: str, settings: GoSettings, options: Options, loop: str) -> Array:
+def _fly(
+    make: Callable[[], LawManoeuvre], on: str, settings: GoSettings, options: Options, loop: str
+) -> Array:
     """Fly and return time, measurement, set-point, error and output of each sample of a loop."""
     rows: list[tuple[float, ...]] = []
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import S
 from volery.trace.events import VehicleState
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 TRACE = "trace.mcap"
 INDEX = "time_s"
@@ -34,7 +34,7 @@ def vehicle_arrays(folder: Path | None, vehicle: str) -> dict[str, NDArray[Any]]
         raise UsageError("this run has kept no trace; give it a folder: Options(out=Path('runs/mine'))")
     rows: list[VehicleState] = []
     names: set[str] = set()
-    with Reading(path) as reading:
+    with OpenTrace(path) as reading:
         for event in reading.events(only=(VehicleState,)):
             if isinstance(event, VehicleState):
                 names.add(event.vehicle)

@@ -83,7 +83,7 @@ class ControlledLink:
             link.close()
 
 
-class LinkControl(Protocol):
+class WireControl(Protocol):
     """Control over the wire of the first program, in either direction."""
 
     receives: bool
@@ -99,7 +99,7 @@ class LinkControl(Protocol):
 class Access(ABC):
     """Opens drivers. ``control`` is that of the first driver's wire, ``link`` the wire if it is a link."""
 
-    control: LinkControl
+    control: WireControl
     link: Link | None = None
     protocol = ""
 

@@ -25,7 +25,7 @@ from volery.base.process import without_hang_ups
 from volery.base.time import to_seconds
 from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
-from volery.testing.stage import RealStage, SimulatedStage, Stage, kind_of
+from volery.testing.stage import RealStage, SimulatedStage, TestStage, kind_of
 from volery.vehicles.address import Address, parse
 from volery.vehicles.telemetry import describe_state
 
@@ -85,7 +85,7 @@ class Report:
     @property
     def faults(self) -> tuple[Result, ...]:
         """Results of the checks that failed."""
-        return tuple(one for one in self.results if one.outcome is Outcome.FAILED)
+        return tuple(result for result in self.results if result.outcome is Outcome.FAILED)
 
     @property
     def conforms(self) -> bool:
@@ -94,7 +94,7 @@ class Report:
 
     def as_data(self) -> dict[str, Any]:
         """Return the report as values for JSON."""
-        results = [{**asdict(one), "outcome": one.outcome.value} for one in self.results]
+        results = [{**asdict(result), "outcome": result.outcome.value} for result in self.results]
         return {
             "url": self.url,
             "seed": self.seed,
@@ -238,7 +238,7 @@ class _LackingError(Exception):
     """Return whether the vehicle lacks a capability that the check needs."""
 
 
-def _play(one: Check, stage: Stage) -> str | None:
+def _play(one: Check, stage: TestStage) -> str | None:
     stage.drone.wait_connected()
     missing = [each for each in one.needs if each not in stage.drone.capabilities]
     if missing:
@@ -246,7 +246,7 @@ def _play(one: Check, stage: Stage) -> str | None:
     return one.body(stage)
 
 
-def _judged(one: Check, stage: Stage, play: Callable[[], str | None]) -> Result:
+def _judged(one: Check, stage: TestStage, play: Callable[[], str | None]) -> Result:
     began = stage.kernel.now()
     outcome, detail = Outcome.FAILED, ""
     try:

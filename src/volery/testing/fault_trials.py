@@ -41,7 +41,7 @@ from volery.run.assembly.fault_effects import NO_WIRE_FAULTS, Affected, apply_fa
 from volery.simulation.world.body_specs import STANDARD_GRAVITY, BodySpec, Multirotor
 from volery.testing.checks import CheckFailedError, demand
 from volery.testing.driver_checks.manual_control_checks import fly_by_hand
-from volery.testing.stage import SimulatedStage, Stage
+from volery.testing.stage import SimulatedStage, TestStage
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone
 from volery.vehicles.address import parse
@@ -130,14 +130,14 @@ def strike(fault: Fault | None, stage: SimulatedStage) -> None:
 
 
 Strike = Callable[[], None]
-Program = Callable[[Stage, Strike], None]
+Program = Callable[[TestStage, Strike], None]
 
 AT_ONCE_S = 0.01
 DURING_S = 3.0
 """Time after the beginning of the call, s."""
 
 
-def ground(stage: Stage, strike: Strike) -> None:
+def ground(stage: TestStage, strike: Strike) -> None:
     """Arm on the ground, strike, then disarm."""
     stage.drone.wait_ready()
     stage.drone.hold()
@@ -147,14 +147,14 @@ def ground(stage: Stage, strike: Strike) -> None:
     stage.drone.disarm()
 
 
-def arming(stage: Stage, strike: Strike) -> None:
+def arming(stage: TestStage, strike: Strike) -> None:
     """Strike at the beginning of the take-off, while its commands are in transit."""
     stage.drone.wait_ready()
     stage.later(AT_ONCE_S, strike)
     stage.drone.takeoff(15)
 
 
-def takeoff(stage: Stage, strike: Strike) -> None:
+def takeoff(stage: TestStage, strike: Strike) -> None:
     """Strike during the climb."""
     stage.drone.wait_ready()
     stage.later(2 * DURING_S, strike)
@@ -169,14 +169,14 @@ GOALS: Mapping[str, tuple[float, float, float]] = {
 """Where the last goto() of a phase goes: north, east, up about home [m]."""
 
 
-def goto(stage: Stage, strike: Strike) -> None:
+def goto(stage: TestStage, strike: Strike) -> None:
     """Strike on the way to a position."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
     stage.drone.goto(stage.at(*GOALS["goto"]))
 
 
-def hold(stage: Stage, strike: Strike) -> None:
+def hold(stage: TestStage, strike: Strike) -> None:
     """Strike while holding position, wait, then continue with goto()."""
     stage.drone.takeoff(10)
     stage.drone.hold()
@@ -185,7 +185,7 @@ def hold(stage: Stage, strike: Strike) -> None:
     stage.drone.goto(stage.at(*GOALS["hold"]))
 
 
-def return_home(stage: Stage, strike: Strike) -> None:
+def return_home(stage: TestStage, strike: Strike) -> None:
     """Strike at the beginning of the return home."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(20, 20, 10))
@@ -193,14 +193,14 @@ def return_home(stage: Stage, strike: Strike) -> None:
     stage.drone.return_home()
 
 
-def land(stage: Stage, strike: Strike) -> None:
+def land(stage: TestStage, strike: Strike) -> None:
     """Strike during the descent."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
     stage.drone.land()
 
 
-def sticks(stage: Stage, strike: Strike) -> None:
+def sticks(stage: TestStage, strike: Strike) -> None:
     """Strike during manual control, then continue with goto()."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0.0, 0.0, 0.5, 0.0)

@@ -32,7 +32,7 @@ from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.run.assembly.vehicles import EMBEDDED, KINDS
 from volery.simulation.autopilots.fleet_autopilot import FleetAutopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.testing.access import ControlledLink, LinkControl, access_to
+from volery.testing.access import ControlledLink, WireControl, access_to
 from volery.testing.checks import NotPossibleError, demand
 from volery.trace.events import Event
 from volery.vehicles import Drone, Rover, Vehicle
@@ -51,7 +51,7 @@ STATION, CONSOLE = 255, 190
 """Usual system and component id of a ground station on MAVLink."""
 
 
-class Commander:
+class SecondStation:
     """Another ground station with a link of its own, which commands the vehicle at any time."""
 
     def __init__(self, kernel: Kernel, driver: Driver, link: Link | None = None, protocol: str = "") -> None:
@@ -101,7 +101,7 @@ class Commander:
         self._driver.close()
 
 
-class Stage(ABC):
+class TestStage(ABC):
     """What a check acts on: a connected vehicle at rest on the ground, time, and other commanders."""
 
     drone: Any
@@ -110,7 +110,7 @@ class Stage(ABC):
     kernel: Kernel
 
     def __init__(self) -> None:
-        self._others: list[Commander] = []
+        self._others: list[SecondStation] = []
 
     @property
     def name(self) -> str:
@@ -175,10 +175,10 @@ class Stage(ABC):
 
     @property
     @abstractmethod
-    def link_control(self) -> LinkControl:
+    def link_control(self) -> WireControl:
         """Control over the wire of the program under test."""
 
-    def other(self) -> Commander:
+    def other(self) -> SecondStation:
         """Return a connected second commander; ``NotPossibleError`` if there can be none."""
         commander = self._commander()
         self._others.append(commander)
@@ -186,7 +186,7 @@ class Stage(ABC):
         return commander
 
     @abstractmethod
-    def _commander(self) -> Commander:
+    def _commander(self) -> SecondStation:
         """Return another commander on a link of its own."""
 
     @abstractmethod
@@ -232,8 +232,8 @@ def kind_of(name: str) -> type[Vehicle]:
     return kinds[name]
 
 
-class RealStage(Stage):
-    """See ``Stage``. `second` is the address of another link to the same vehicle, for other commanders."""
+class RealStage(TestStage):
+    """See ``TestStage``. `second` is the address of another link to the vehicle, for others."""
 
     def __init__(self, address: Address, kind: type[Vehicle], second: str) -> None:
         super().__init__()
@@ -250,7 +250,7 @@ class RealStage(Stage):
         self._ended = False
 
     def end_program(self) -> None:
-        """See ``Stage``; ``rest`` starts it again."""
+        """See ``TestStage``; ``rest`` starts it again."""
         super().end_program()
         self._ended = True
 
@@ -281,9 +281,9 @@ class RealStage(Stage):
             raise NotPossibleError("needs a second link to the vehicle: state one with --second URL")
         return self._open(self._second, **more)
 
-    def _commander(self) -> Commander:
+    def _commander(self) -> SecondStation:
         link_control, driver = self._at_second()
-        return Commander(self.kernel, driver, link_control, drivers.load(self._address.driver).codec.name)
+        return SecondStation(self.kernel, driver, link_control, drivers.load(self._address.driver).codec.name)
 
     def another_program(self) -> Any:
         """Return the vehicle for another program, on the second link."""
@@ -350,7 +350,7 @@ AWAY_DEG = 0.0005
 """Distance of the neighbour east of the vehicle, degrees of longitude: about 40 m."""
 
 
-class SafetyPilot(Commander):
+class SafetyPilot(SecondStation):
     """The other commander where all programs share one node: the pilot, who uses mode switch and throttle."""
 
     def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: FleetAutopilot) -> None:
@@ -368,8 +368,8 @@ class SafetyPilot(Commander):
         raise NotPossibleError(f"programs share one node, which cannot tell who sent it to {place}")
 
 
-class SimulatedStage(Stage):
-    """See ``Stage``. ``events`` has all recorded events."""
+class SimulatedStage(TestStage):
+    """See ``TestStage``. ``events`` has all recorded events."""
 
     def __init__(
         self,
@@ -420,7 +420,7 @@ class SimulatedStage(Stage):
         return found
 
     @property
-    def link_control(self) -> LinkControl:
+    def link_control(self) -> WireControl:
         """Control over the wire of the program under test."""
         return self._access.control
 
@@ -428,12 +428,12 @@ class SimulatedStage(Stage):
         """Apply faults to the wire of the program under test from now on."""
         self._access.set_faults(faults)
 
-    def _commander(self) -> Commander:
+    def _commander(self) -> SecondStation:
         if self.link is None:
             driver, _ = self._access.another(self.name_of_vehicle)
             return SafetyPilot(self.kernel, driver, self.fleet.autopilots[self.name_of_vehicle])
         driver, link = self._access.another(self.name_of_vehicle)
-        return Commander(self.kernel, driver, link, self._access.protocol)
+        return SecondStation(self.kernel, driver, link, self._access.protocol)
 
     def another_program(self, **options: str) -> Any:
         """Return the vehicle for another program, on a new link or as another node."""
@@ -458,7 +458,7 @@ class SimulatedStage(Stage):
         if not self._neighbour:
             raise NotPossibleError("it is alone")
         driver, _ = self._access.another(self._neighbour)
-        self._others.append(Commander(self.kernel, driver))
+        self._others.append(SecondStation(self.kernel, driver))
         return self._kind(self.kernel, self._neighbour, driver)
 
     def close(self) -> None:

@@ -302,7 +302,7 @@ def _sample(value: Any, number: int) -> Any:
 def every_type_arrives_as_it_was(site: Site) -> None:
     """Check that messages of each type in ``PUBLISHED`` arrive with all their values."""
     speaker, listener = site.node("speaker"), site.node("listener")
-    names = [one for one in types() if one.split("/")[0] in PUBLISHED and site.traits.carries(one)]
+    names = [kind for kind in types() if kind.split("/")[0] in PUBLISHED and site.traits.carries(kind)]
     received: dict[str, Any] = {}
     publishers = {}
     for number, name in enumerate(names):

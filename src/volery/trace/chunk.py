@@ -11,7 +11,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any
 
-from volery.trace.encoding import Layout, encoder, fields
+from volery.trace.encoding import EventLayout, encoder, fields
 
 _MESSAGE = 5
 _MESSAGE_INDEX = 7
@@ -41,7 +41,7 @@ class Chunk:
         """Add a record that is not a message."""
         self._records += record
 
-    def writer(self, layout: Layout, open_channel: Callable[..., int]) -> Callable[[Any], None]:
+    def writer(self, layout: EventLayout, open_channel: Callable[..., int]) -> Callable[[Any], None]:
         """Return the function that writes events of one kind.
 
         Args:

@@ -37,7 +37,7 @@ _make: Callable[[type[Any], tuple[Any, ...]], Any] = (
 )  # as the constructor of a named tuple, but faster
 
 
-class Layout(NamedTuple):
+class EventLayout(NamedTuple):
     """Where a message has the fields of an event; fields are given by their indexes.
 
     Log time is the field ``log``, or ``publish`` where ``log`` is negative. The fields ``subject`` decide the
@@ -54,7 +54,7 @@ class Layout(NamedTuple):
     data: int = -1
 
 
-PUBLISHED = Layout(
+PUBLISHED = EventLayout(
     log=Published._fields.index("at"),
     publish=Published._fields.index("at"),
     subject=tuple(Published._fields.index(name) for name in ("topic", "type", "publisher")),
@@ -92,7 +92,7 @@ def _times(kind: type[Any]) -> tuple[int, int]:
     raise TypeError(f"{kind.__name__} has no field for its time")
 
 
-class Codec:
+class EventCodec:
     """Encoder and decoder of events of one kind, with their ``layout`` and message ``definition``.
 
     ``encode`` returns the CDR bytes of an event.
@@ -110,7 +110,7 @@ class Codec:
             )
         log, publish = _times(kind)
         self.kind = kind
-        self.layout = Layout(
+        self.layout = EventLayout(
             log,
             publish,
             subject=tuple(kind._fields.index(one) for one in _SUBJECTS.get(kind, ())),
@@ -144,7 +144,7 @@ class Codec:
         return _make(self.kind, self._in_order((*numbers, *strings)))
 
 
-def encoder(layout: Layout) -> Callable[[Any], bytes]:
+def encoder(layout: EventLayout) -> Callable[[Any], bytes]:
     """Return the function that returns the CDR bytes of an event, by a layout without ``data``."""
     pack = struct.Struct(_head(layout)).pack
     numbers, words = fields(layout.numbers), fields(layout.words)
@@ -162,7 +162,7 @@ def encoder(layout: Layout) -> Callable[[Any], bytes]:
     return encode
 
 
-def _head(layout: Layout) -> str:
+def _head(layout: EventLayout) -> str:
     """Return the format of the encapsulation header and the numbers, padded to 4 bytes."""
     return f"<I{layout.codes}{-struct.calcsize(f'<{layout.codes}') % 4}x"
 

@@ -23,11 +23,11 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from zstandard import ZstdCompressor
 
-from volery.base.files import Output
+from volery.base.files import RecordFile
 from volery.base.time import Ns, S
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, to_json
 from volery.trace.chunk import Chunk
-from volery.trace.encoding import OWN_EVENTS, PUBLISHED, Codec, type_name
+from volery.trace.encoding import OWN_EVENTS, PUBLISHED, EventCodec, type_name
 from volery.trace.events import Event, Published, Record, VehicleState
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -68,7 +68,7 @@ class McapWriter:
     """A listener of the event stream that writes ``trace.mcap``. Call it with events, then ``close`` it.
 
     Args:
-        path: The file to write. For a full disk, see ``Output``.
+        path: The file to write. For a full disk, see ``RecordFile``.
         setup: The set-up of the run, which is attached.
         attachments: Further files to attach.
         definitions: Returns the definition of each type of published message; called once a type.
@@ -85,7 +85,7 @@ class McapWriter:
         definitions: Definitions = _no_definition,
     ) -> None:
         self.path = path
-        self._output = Output(path)
+        self._output = RecordFile(path)
         self._definitions = definitions
         self._summary = _Summary()
         self._compressor = ZstdCompressor(level=_LEVEL)
@@ -96,7 +96,7 @@ class McapWriter:
             Published: self._chunk.writer(PUBLISHED, self._published_channel)
         }
         for kind in OWN_EVENTS:
-            codec = Codec(kind)
+            codec = EventCodec(kind)
             self._writers[kind] = self._chunk.writer(codec.layout, partial(self._own_channel, codec))
         self._output.write(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
         self.metadata("volery", {"schema": TRACE_SCHEMA, "seed": str(setup.seed)})
@@ -188,7 +188,7 @@ class McapWriter:
         self._chunk.add(record)
         return channel
 
-    def _own_channel(self, codec: Codec, subject: str = "") -> int:
+    def _own_channel(self, codec: EventCodec, subject: str = "") -> int:
         """Return the channel of events of one kind; each vehicle's states and each topic have their own."""
         name = f"{subject}/state" if codec.kind is VehicleState else codec.kind.__name__.lower() + subject
         schema = self._schema(type_name(codec.kind), codec.definition)

@@ -24,7 +24,7 @@ from zstandard import ZstdDecompressor, ZstdError
 from volery.base.errors import UsageError
 from volery.base.time import Ns, clock
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_from_json
-from volery.trace.encoding import OWN_EVENTS, Codec, type_name
+from volery.trace.encoding import OWN_EVENTS, EventCodec, type_name
 from volery.trace.events import Event, Published
 from volery.trace.mcap_writer import COMPRESSION, MAGIC, TRACE_SCHEMA, Attachment
 
@@ -61,18 +61,18 @@ def read(path: Path) -> Trace:
     Raises:
         UsageError: it is no trace, or cut before its set-up.
     """
-    with Reading(path) as reading:
+    with OpenTrace(path) as reading:
         events = tuple(reading.events())
     return Trace(reading.setup, events, reading.attachments, reading.metadata, reading.complete, reading.lost)
 
 
-class _Record(NamedTuple):
+class _ChunkRecord(NamedTuple):
     opcode: int
     content: bytes
     missing: int  # bytes that are cut off
 
 
-class Reading:
+class OpenTrace:
     """An open trace: iterate over ``events()`` once, then see ``complete`` and ``lost``.
 
     The set-up and the attachments made at the start are available at once, later ones when ``events()`` has
@@ -98,7 +98,7 @@ class Reading:
             raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
         self._size = path.stat().st_size
         self._records = self._walk()
-        self._pending: _Record | None = None
+        self._pending: _ChunkRecord | None = None
         try:
             if self._file.read(len(MAGIC)) != MAGIC:
                 raise UsageError(f"{path} is not a trace: it does not begin as an MCAP file does")
@@ -107,7 +107,7 @@ class Reading:
             self._file.close()
             raise
 
-    def __enter__(self) -> Reading:
+    def __enter__(self) -> OpenTrace:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -149,18 +149,18 @@ class Reading:
             raise UsageError(f"{self.path} {what}")
         return setup_from_json(self.attachments[SETUP_ATTACHMENT].data)
 
-    def _walk(self) -> Iterator[_Record]:
+    def _walk(self) -> Iterator[_ChunkRecord]:
         while True:
             head = self._file.read(_HEAD.size)
             if len(head) < _HEAD.size:
                 return
             opcode, length = _HEAD.unpack(head)
             content = self._file.read(min(length, self._size))
-            yield _Record(opcode, content, length - len(content))
+            yield _ChunkRecord(opcode, content, length - len(content))
             if opcode in (Opcode.DATA_END, Opcode.FOOTER) or len(content) < length:
                 return
 
-    def _next(self) -> _Record | None:
+    def _next(self) -> _ChunkRecord | None:
         """Return the next record, after storing attachments and metadata."""
         record = next(self._records, None)
         if record is None or record.missing:
@@ -181,7 +181,7 @@ class Reading:
         self._file.seek(max(0, self._file.tell() - len(MAGIC)))
         return self._file.read() == MAGIC
 
-    def _events_of_chunk(self, record: _Record) -> Iterator[Event]:
+    def _events_of_chunk(self, record: _ChunkRecord) -> Iterator[Event]:
         if len(record.content) < _CHUNK_OVERHEAD:
             return
         *_, size, checksum, name_length = _CHUNK_HEAD.unpack_from(record.content)
@@ -248,8 +248,8 @@ class Reading:
 
 
 @cache
-def _codecs() -> dict[str, Codec]:
-    return {type_name(kind): Codec(kind) for kind in OWN_EVENTS}
+def _codecs() -> dict[str, EventCodec]:
+    return {type_name(kind): EventCodec(kind) for kind in OWN_EVENTS}
 
 
 def _decompressed(content: bytes, size: int) -> bytes:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from volery.base.files import Output
+from volery.base.files import RecordFile
 from volery.base.time import Ns
 from volery.trace.events import (
     Activation,
@@ -49,7 +49,7 @@ _RUN = "the run"
 class TimelineWriter:
     """A listener of the event stream that writes ``timeline.json``. Call it with events, then ``close`` it.
 
-    For a full disk, see ``Output``.
+    For a full disk, see ``RecordFile``.
 
     Raises:
         UsageError: the file cannot be created.
@@ -57,7 +57,7 @@ class TimelineWriter:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._output = Output(path)
+        self._output = RecordFile(path)
         self._spans = Spans(self._output.write, self._core, _task)
         self._processes: dict[str, int] = {}
         self._threads: dict[tuple[str, str], str] = {}

@@ -29,7 +29,7 @@ from urllib.parse import SplitResult, parse_qsl, urlsplit
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CodedLink
-from volery.links.link import Codec
+from volery.links.link import WireFormat
 from volery.links.mavlink_codec import MAVLINK, SignedMavlink, read_key
 from volery.links.stream_links import SerialLink, TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
@@ -223,7 +223,9 @@ def _check_socket(address: Address) -> None:
 # -- opening links
 
 
-def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, shared: bool = False) -> CodedLink:
+def open_link(
+    kernel: Kernel, address: Address, codec: WireFormat = MAVLINK, *, shared: bool = False
+) -> CodedLink:
     """Open the link to an autopilot; it connects by itself, and again after a break.
 
     Args:
@@ -258,7 +260,7 @@ def listen(
     address: Address,
     *,
     on_connect: Callable[[], None] | None = None,
-    codec: Codec = MAVLINK,
+    codec: WireFormat = MAVLINK,
 ) -> CodedLink:
     """Open the link at which a simulated autopilot is served.
 
@@ -277,7 +279,7 @@ def listen(
     return _udp(kernel, address, codec)
 
 
-def _signed(address: Address, codec: Codec) -> Codec:
+def _signed(address: Address, codec: WireFormat) -> WireFormat:
     """Return the codec of a link: a signed one if the address names a key."""
     file = address.options.get(SIGNING)
     if file is None:
@@ -287,7 +289,7 @@ def _signed(address: Address, codec: Codec) -> Codec:
     return SignedMavlink(read_key(Path(file)))
 
 
-def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:
+def _udp(kernel: Kernel, address: Address, codec: WireFormat) -> UdpLink:
     if address.host:
         local = _port_option(address, LOCAL_PORT)
         if LOCAL_ADDRESS in address.options:

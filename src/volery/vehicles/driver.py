@@ -18,7 +18,7 @@ from volery.base.installed import Registry
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Codec, Link, ReceiveStatistics
+from volery.links.link import Link, ReceiveStatistics, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 from volery.vehicles.services import Services
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -380,7 +380,7 @@ class DriverFactory:
     """
 
     on_link: Opener | None = None
-    codec: Codec = MAVLINK
+    codec: WireFormat = MAVLINK
     on_graph: Opener | None = None
     on_ros2: Opener | None = None
     namespace: str = "/{name}"

@@ -11,7 +11,7 @@ from volery.base.time import Ns, S, from_seconds
 from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
 from volery.vehicles.executor import RESTARTS
 from volery.vehicles.limits import height_violation
-from volery.vehicles.monitors import NO_GOAL, Demand, Goal
+from volery.vehicles.monitors import NO_GOAL, Goal, StreamedSetpoint
 from volery.vehicles.operations import LANDING, STREAM, TO_SAFETY, TRAVEL, TURN
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle
@@ -197,7 +197,7 @@ class Drone(Vehicle):
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
-        self._operations.note_streamed(Demand(velocity=velocity, yaw_rate=yaw_rate), lasting)
+        self._operations.note_streamed(StreamedSetpoint(velocity=velocity, yaw_rate=yaw_rate), lasting)
 
     def set_acceleration(
         self,
@@ -235,7 +235,9 @@ class Drone(Vehicle):
             lambda: self._driver.acceleration(Acceleration(north, east, up), yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
-        self._operations.note_streamed(Demand(acceleration=(north, east, up), yaw_rate=yaw_rate), lasting)
+        self._operations.note_streamed(
+            StreamedSetpoint(acceleration=(north, east, up), yaw_rate=yaw_rate), lasting
+        )
 
     def set_attitude(
         self,
@@ -283,7 +285,9 @@ class Drone(Vehicle):
             policy=STREAM,
         )
         turning = yaw_rate if heading is None else nan
-        asked_for = Demand(roll=roll, pitch=pitch, heading=target.heading, yaw_rate=turning, thrust=thrust)
+        asked_for = StreamedSetpoint(
+            roll=roll, pitch=pitch, heading=target.heading, yaw_rate=turning, thrust=thrust
+        )
         self._operations.note_streamed(asked_for, lasting)
 
     def set_heading(self, degrees: float) -> None:

@@ -63,7 +63,7 @@ class Escalation:
     time_to_act: float = 10.0
 
     def __post_init__(self) -> None:
-        ranks = [_RANKS.index(one) for one in self.reactions]
+        ranks = [_RANKS.index(reaction) for reaction in self.reactions]
         if not ranks or ranks != sorted(set(ranks)):
             raise UsageError(f"{self}: state reactions in increasing rank, as (Reaction.HOLD, Reaction.LAND)")
         if not self.time_to_act > 0.0:
@@ -72,7 +72,11 @@ class Escalation:
     def after(self, error: VehicleError, capabilities: frozenset[Capability]) -> tuple[Reaction, ...]:
         """Return the reactions to *error* in the order in which they are tried."""
         first = next((reaction for kind, reaction in _FIRST if isinstance(error, kind)), Reaction.HOLD)
-        able = [one for one in self.reactions if one is not Reaction.LAND or Capability.LAND in capabilities]
+        able = [
+            reaction
+            for reaction in self.reactions
+            if reaction is not Reaction.LAND or Capability.LAND in capabilities
+        ]
         wanted = [one for one in able if _RANKS.index(one) >= _RANKS.index(first)]
         return tuple(wanted or able[-1:])
 

@@ -65,7 +65,7 @@ class Meaning(Generic[T]):
     source: str
 
 
-class Rule(Generic[T]):
+class VersionRule(Generic[T]):
     """Something whose meaning depends on the version.
 
     Args:

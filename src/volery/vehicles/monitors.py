@@ -421,7 +421,7 @@ EFFECT_SHARE, EFFECT_M, EFFECT_DEG, EFFECT_CLIMB_M = 0.1, 0.5, 5.0, 0.3
 """What counts as an effect: this share of what was asked for, or this way, turn or climb."""
 
 
-class Demand(NamedTuple):
+class StreamedSetpoint(NamedTuple):
     """A set-point of a stream; NaN for what it does not state.
 
     Args:
@@ -459,13 +459,13 @@ class FollowMonitor:
 
     def __init__(self, telemetry: Telemetry) -> None:
         self._telemetry = telemetry
-        self._demand: Demand | None = None
+        self._demand: StreamedSetpoint | None = None
         self._lasting: Ns = 0
         self._asked_at = self._began = self._summed = telemetry.moment()
         self._enough: Moment | None = None  # since when enough was asked for to judge
         self._begin()
 
-    def ask(self, demand: Demand, lasting: Ns) -> None:
+    def ask(self, demand: StreamedSetpoint, lasting: Ns) -> None:
         """Note the set-point that is streamed from now on, for *lasting* ns or until the next one."""
         self._sum()
         if self._demand is None:
@@ -749,8 +749,8 @@ class BoundsMonitor:
         violations = self._bounds.violations(here)
         self._violated_at_start.intersection_update(violations)
         ignored = self._violated_at_start | self._ignored
-        found = [text for name, text in violations.items() if name not in ignored]
-        return OutOfBounds(self._telemetry.name, operation, " and ".join(found)) if found else None
+        items = [text for name, text in violations.items() if name not in ignored]
+        return OutOfBounds(self._telemetry.name, operation, " and ".join(items)) if items else None
 
 
 # -- all of them

@@ -9,7 +9,7 @@ from volery.base.errors import Refused, UsageError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.links.mavlink_messages import constant, has_global_place
 from volery.vehicles.limits import Fence as ClientFence
-from volery.vehicles.services import FENCE, MISSION, RALLY, Item, Services
+from volery.vehicles.services import FENCE, MISSION, RALLY, PlanItem, Services
 from volery.vehicles.telemetry import Telemetry
 from volery.vehicles.vehicle_plan import (
     AUTOPILOTS,
@@ -32,7 +32,7 @@ _LAST_NAVIGATION = 95
 """MAV_CMD_NAV_LAST: commands up to it lead to a place."""
 _ABSOLUTE = (constant("MAV_FRAME_GLOBAL"), constant("MAV_FRAME_GLOBAL_INT"))
 _TERRAIN = (constant("MAV_FRAME_GLOBAL_TERRAIN_ALT"), constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"))
-_HOME = Item(_WAYPOINT, 0, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+_HOME = PlanItem(_WAYPOINT, 0, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 """Item 0 of an ArduPilot, which it fills in itself."""
 
 Check = Callable[[str, Position], None]
@@ -111,13 +111,13 @@ class OnboardPlan:
 
     # -- the mission: item numbers in jumps, and an item for home
 
-    def _upload_mission(self, items: tuple[Item, ...]) -> None:
+    def _upload_mission(self, items: tuple[PlanItem, ...]) -> None:
         first = 1 if self._services.home_first else 0
         numbered = [_jump_moved(item, first - 1) for item in items]
         home = [_HOME] if self._services.home_first and items else []
         self._services.upload_items(MISSION, [*home, *numbered])
 
-    def _download_mission(self) -> tuple[tuple[Item, ...], Position | None]:
+    def _download_mission(self) -> tuple[tuple[PlanItem, ...], Position | None]:
         """Return the mission, and home where the list begins with it."""
         first = 1 if self._services.home_first else 0
         items = self._services.download_items(MISSION)
@@ -152,7 +152,7 @@ class OnboardPlan:
             self._check(what, place)
 
 
-def _altitude(item: Item) -> Altitude:
+def _altitude(item: PlanItem) -> Altitude:
     if item.frame in _TERRAIN:
         return AboveGround(item.z)
     return AMSL(item.z) if item.frame in _ABSOLUTE else AboveHome(item.z)
@@ -166,7 +166,7 @@ def _checked(only: Collection[str]) -> Collection[str]:
     return parts
 
 
-def _jump_moved(item: Item, by: int) -> Item:
+def _jump_moved(item: PlanItem, by: int) -> PlanItem:
     """Return the item with the number that a jump leads to moved by *by*."""
     if item.command != DO_JUMP or not by:
         return item

@@ -36,7 +36,7 @@ from volery.trace.events import Operation
 from volery.vehicles.driver import Capability, Driver, ManualControl, Step
 from volery.vehicles.escalation import Escalation, Reaction, escalate
 from volery.vehicles.executor import MONITOR_PERIOD, Check, StepExecutor
-from volery.vehicles.monitors import NO_GOAL, Demand, FlightMonitor, Goal, Movement, low_battery
+from volery.vehicles.monitors import NO_GOAL, FlightMonitor, Goal, Movement, StreamedSetpoint, low_battery
 from volery.vehicles.vehicle_bounds import VehicleBounds
 from volery.vehicles.vehicle_connection import LINK_RETURN_S
 
@@ -152,7 +152,7 @@ class Operations:
         """Whether what goes on after a call is monitored."""
         return self._monitor is not None
 
-    def note_streamed(self, demand: Demand, lasting: float) -> None:
+    def note_streamed(self, demand: StreamedSetpoint, lasting: float) -> None:
         """Note what is streamed from now on, for *lasting* s; the vehicle must follow it."""
         with self._kernel.guard:
             self._monitors.following.ask(demand, from_seconds(lasting))

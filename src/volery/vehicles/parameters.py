@@ -23,7 +23,7 @@ QGC, PLAIN = ".params", (".param", ".parm")
 SYSTEM, COMPONENT = 1, 1
 
 
-class Difference(NamedTuple):
+class ParameterDifference(NamedTuple):
     """One parameter that differs; ``None`` where a side does not have it."""
 
     name: str
@@ -52,7 +52,7 @@ class Parameters:
         self._services = services
         self._system = system or SYSTEM
         self.converted: dict[str, str] = {}
-        self.left_alone: list[Difference] = []
+        self.left_alone: list[ParameterDifference] = []
 
     def get(self, name: str) -> float:
         """Return the value of one parameter.
@@ -89,15 +89,15 @@ class Parameters:
         path = Path(file)
         if path.suffix not in (QGC, *PLAIN):
             raise UsageError(f"{path}: end the name in .params (QGroundControl), .param or .parm")
-        found = self._services.read_parameters()
-        text = _qgc_text(found, self._system) if path.suffix == QGC else _plain_text(found)
+        parameters = self._services.read_parameters()
+        text = _qgc_text(parameters, self._system) if path.suffix == QGC else _plain_text(parameters)
         try:
             replace_text(path, text)
         except OSError as error:
             raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
-        return len(found)
+        return len(parameters)
 
-    def load(self, file: str | Path) -> list[Difference]:
+    def load(self, file: str | Path) -> list[ParameterDifference]:
         """Set the parameters of a file that differ, and return what was changed (``here`` is the old value).
 
         A parameter that the autopilot refuses or does not have does not stop the others. A parameter that has
@@ -128,7 +128,7 @@ class Parameters:
             )
         return changed
 
-    def compare(self, file: str | Path | Mapping[str, float]) -> list[Difference]:
+    def compare(self, file: str | Path | Mapping[str, float]) -> list[ParameterDifference]:
         """Return where the vehicle (``here``) and a file or mapping (``there``) differ, by name.
 
         Parameters that only the vehicle has are left out: a file usually states a part of them. What a file
@@ -138,7 +138,7 @@ class Parameters:
         there = file if isinstance(file, Mapping) else read_parameter_file(file)
         here = self.all()
         own, self.converted = self._under_own_names(there, here)
-        found = [one for one in differences(here, own) if one.there is not None]
+        found = [difference for difference in differences(here, own) if difference.there is not None]
         volatile = self._services.parameter_rules.volatile
         self.left_alone = [one for one in found if one.name in volatile and one.here is not None]
         return [one for one in found if one.name not in volatile]
@@ -160,14 +160,14 @@ class Parameters:
         return own, stated
 
 
-def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[Difference]:
+def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[ParameterDifference]:
     """Return the parameters that differ by more than a 32-bit float does, in alphabetical order."""
     found = []
     for name in sorted({*here, *there}):
         mine, other = here.get(name), there.get(name)
         same = mine is not None and other is not None and isclose(mine, other, rel_tol=1e-6, abs_tol=1e-9)
         if not same:
-            found.append(Difference(name, mine, other))
+            found.append(ParameterDifference(name, mine, other))
     return found
 
 

@@ -17,7 +17,7 @@ from volery.base.time import Ns
 from volery.vehicles.external_pose import ExternalPose
 
 
-class Item(NamedTuple):
+class PlanItem(NamedTuple):
     """An item of a plan as in MAVLink: latitude and longitude in degrees, ``z`` in metres of ``frame``."""
 
     command: int
@@ -186,10 +186,10 @@ class Services(Protocol):
     def write_parameter(self, name: str, value: float) -> Parameter:
         """Write one parameter; return what the autopilot then reports. ``Refused`` if it keeps another."""
 
-    def download_items(self, kind: int) -> list[Item]:
+    def download_items(self, kind: int) -> list[PlanItem]:
         """Read a list of items."""
 
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+    def upload_items(self, kind: int, items: Sequence[PlanItem]) -> None:
         """Replace a list of items; an empty one clears it."""
 
     def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
@@ -270,11 +270,11 @@ class PartialServices:
         """See ``Services``."""
         raise self._unsupported(f"set the parameter {name}")
 
-    def download_items(self, kind: int) -> list[Item]:
+    def download_items(self, kind: int) -> list[PlanItem]:
         """See ``Services``."""
         raise self._unsupported("read a plan on board")
 
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+    def upload_items(self, kind: int, items: Sequence[PlanItem]) -> None:
         """See ``Services``."""
         raise self._unsupported("store a plan on board")
 

@@ -77,7 +77,7 @@ def subscribe(
         return kernel.every(period, check)
 
 
-class Sample(NamedTuple):
+class TelemetrySample(NamedTuple):
     """The values of one moment, by quantity."""
 
     at: Ns
@@ -101,13 +101,13 @@ class TelemetryHistory:
         self.quantities = tuple(quantities)
         self._kernel = kernel
         self._telemetry = telemetry
-        self._samples: deque[Sample] = deque(maxlen=max(1, keep // period))
+        self._samples: deque[TelemetrySample] = deque(maxlen=max(1, keep // period))
         with kernel.guard:
             self._handle = kernel.every(period, self._sample)
 
     def _sample(self) -> None:
         values = tuple(_READ[quantity](self._telemetry) for quantity in self.quantities)
-        self._samples.append(Sample(self._kernel.now(), values))
+        self._samples.append(TelemetrySample(self._kernel.now(), values))
 
     def stop(self) -> None:
         """Record nothing more; what was recorded stays."""
@@ -115,18 +115,18 @@ class TelemetryHistory:
             self._handle.cancel()
 
     @property
-    def samples(self) -> list[Sample]:
+    def samples(self) -> list[TelemetrySample]:
         """What was recorded, oldest first; times are ns since the start of the run."""
         with self._kernel.guard:
             return list(self._samples)
 
     def columns(self) -> dict[str, list[Any]]:
         """Return columns by name: ``time_s``, and ``velocity_north``, ``position_latitude`` and so on."""
-        rows = [{"time_s": to_seconds(one.at), **self._flat(one)} for one in self.samples]
+        rows = [{"time_s": to_seconds(sample.at), **self._flat(sample)} for sample in self.samples]
         names = dict.fromkeys(name for row in rows for name in row)
         return {name: [row.get(name) for row in rows] for name in names}
 
-    def _flat(self, sample: Sample) -> dict[str, Any]:
+    def _flat(self, sample: TelemetrySample) -> dict[str, Any]:
         row: dict[str, Any] = {}
         for quantity, value in zip(self.quantities, sample.values, strict=True):
             if isinstance(value, Position):

@@ -38,7 +38,7 @@ fences and rally points up and down; get, set, load, save; ``volery vehicle conf
 """
 
 
-class Row(NamedTuple):
+class TriedVersion(NamedTuple):
     """One version of a firmware.
 
     Args:
@@ -64,19 +64,19 @@ _FLOWN, _READ, _UNTRIED = How.FLOWN, How.READ, How.UNTRIED
 _ALL = (_FLOWN,) * len(OPERATIONS)
 _ONLY_READ = (*(_READ,) * (len(OPERATIONS) - 1), _UNTRIED)
 
-TABLE: Sequence[Row] = (
-    Row("ArduPilot", (4, 5), "ArduCopter, ArduRover 4.5", "main of 2024-01-30", "2026-11-28", _ALL),
-    Row("ArduPilot", (4, 6), "ArduCopter 4.6.3", "92b0cd788e", "2026-11-28", _ALL),
-    Row("ArduPilot", (4, 7), "4.7", "64a9c7877b has all of it", "2026-03-21", _ONLY_READ),
-    Row(
+TABLE: Sequence[TriedVersion] = (
+    TriedVersion("ArduPilot", (4, 5), "ArduCopter, ArduRover 4.5", "main of 2024-01-30", "2026-11-28", _ALL),
+    TriedVersion("ArduPilot", (4, 6), "ArduCopter 4.6.3", "92b0cd788e", "2026-11-28", _ALL),
+    TriedVersion("ArduPilot", (4, 7), "4.7", "64a9c7877b has all of it", "2026-03-21", _ONLY_READ),
+    TriedVersion(
         *("ArduPilot", (4, 8), "ArduCopter, ArduRover 4.8.0-dev", "64a9c7877b", "2026-11-28", _ALL),
         "mission-that-returns failed 1 of 4 times, before its mend",
     ),
-    Row("PX4", (1, 13), "PX4 1.13", "v1.13.0", "2022-06-20", _ONLY_READ, "estimator and modes only"),
-    Row("PX4", (1, 14), "PX4 1.14.3", "1dacb4cdef2d; main of 2023-05-31", "2026-11-28", _ALL),
-    Row("PX4", (1, 15), "PX4 1.15.4", "99c40407ffd7", "2026-11-28", _ALL),
-    Row("PX4", (1, 16), "PX4 1.16.2", "54f0455ffcd7", "2026-11-28", _ALL),
-    Row(
+    TriedVersion("PX4", (1, 13), "PX4 1.13", "v1.13.0", "2022-06-20", _ONLY_READ, "estimator and modes only"),
+    TriedVersion("PX4", (1, 14), "PX4 1.14.3", "1dacb4cdef2d; main of 2023-05-31", "2026-11-28", _ALL),
+    TriedVersion("PX4", (1, 15), "PX4 1.15.4", "99c40407ffd7", "2026-11-28", _ALL),
+    TriedVersion("PX4", (1, 16), "PX4 1.16.2", "54f0455ffcd7", "2026-11-28", _ALL),
+    TriedVersion(
         "PX4",
         (1, 17),
         "PX4 1.17.0",
@@ -85,14 +85,14 @@ TABLE: Sequence[Row] = (
         _ALL,
         "1 of 59 checks failed once, before its mend",
     ),
-    Row("PX4", (1, 18), "PX4 1.18", "release/1.18", "2026-07-08", _ONLY_READ, "not released yet"),
-    Row(
+    TriedVersion("PX4", (1, 18), "PX4 1.18", "release/1.18", "2026-07-08", _ONLY_READ, "not released yet"),
+    TriedVersion(
         *("Paparazzi", None, "rotorcraft firmware, master", "f19834aaa, pprzlink ac28897", "2026-11-28"),
         (_FLOWN, _FLOWN, _UNTRIED, _UNTRIED, _FLOWN, _FLOWN),
         "in NPS, volery control go by set-points too; settings stand for parameters, blocks of its plan for "
         "missions",
     ),
-    Row(
+    TriedVersion(
         *("DJI", None, "Onboard SDK 3.8 and 4.1", "definitions and nodes of both", "2026-11-28"),
         (How.REPORTED, _READ, _READ, _READ, _UNTRIED, _UNTRIED),
         "no aircraft was flown by us",
@@ -100,7 +100,7 @@ TABLE: Sequence[Row] = (
 )
 
 
-def row_of(autopilot: str, version: FirmwareVersion | None) -> Row | None:
+def row_of(autopilot: str, version: FirmwareVersion | None) -> TriedVersion | None:
     """Return the row of a vehicle; ``None`` if its version is in none, or not stated where others are."""
     series = version.series if version is not None else None
     return next((row for row in TABLE if row.autopilot == autopilot and row.series == series), None)

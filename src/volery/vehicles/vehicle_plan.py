@@ -20,7 +20,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.links.mavlink_messages import constant, has_global_place, item_scale
 from volery.vehicles.limits import Fence as ClientFence
 from volery.vehicles.limits import Zone
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 
 LARGEST_FILE = 20_000_000
 ABOVE_HOME = constant("MAV_FRAME_GLOBAL_RELATIVE_ALT")
@@ -93,7 +93,7 @@ class Plan:
         vehicle: MAV_TYPE that the file is for.
     """
 
-    mission: tuple[Item, ...] = ()
+    mission: tuple[PlanItem, ...] = ()
     fence: tuple[Area, ...] = ()
     rally: tuple[Position, ...] = ()
     home: Position | None = None
@@ -143,7 +143,7 @@ class Plan:
             raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def _check_item(item: Item, number: int) -> None:
+def _check_item(item: PlanItem, number: int) -> None:
     """Refuse an item that MAVLink cannot carry, or that has a place and no altitude."""
     if not (0 <= item.command <= _LARGEST_COMMAND and 0 <= item.frame <= _LARGEST_FRAME):
         stated = f"command {item.command:.9g}, frame {item.frame:.9g}"
@@ -179,21 +179,21 @@ def areas_of(fence: ClientFence) -> tuple[Area, ...]:
 # -- as items of MAVLink
 
 
-def fence_items(areas: Iterable[Area]) -> list[Item]:
+def fence_items(areas: Iterable[Area]) -> list[PlanItem]:
     """Return areas as the items of MAV_MISSION_TYPE_FENCE."""
     items = []
     for area in areas:
         if isinstance(area, Circle):
             command = _CIRCLE_IN if area.stay_in else _CIRCLE_OUT
-            items.append(Item(command, 0, (area.radius, 0.0, 0.0, 0.0), *area.centre, 0.0))
+            items.append(PlanItem(command, 0, (area.radius, 0.0, 0.0, 0.0), *area.centre, 0.0))
         else:
             command = _POLYGON_IN if area.stay_in else _POLYGON_OUT
             count = float(len(area.corners))
-            items += [Item(command, 0, (count, 0.0, 0.0, 0.0), *corner, 0.0) for corner in area.corners]
+            items += [PlanItem(command, 0, (count, 0.0, 0.0, 0.0), *corner, 0.0) for corner in area.corners]
     return items
 
 
-def fence_areas(items: Iterable[Item]) -> tuple[Area, ...]:
+def fence_areas(items: Iterable[PlanItem]) -> tuple[Area, ...]:
     """Return the areas in items of MAV_MISSION_TYPE_FENCE; items of other commands are left out."""
     areas: list[Area] = []
     corners: list[Corner] = []
@@ -209,31 +209,31 @@ def fence_areas(items: Iterable[Item]) -> tuple[Area, ...]:
     return tuple(areas)
 
 
-def breach_return_items(place: Position | None) -> list[Item]:
+def breach_return_items(place: Position | None) -> list[PlanItem]:
     """Return the place to return to from a breach as an item of MAV_MISSION_TYPE_FENCE."""
     if place is None:
         return []
     at = place.latitude, place.longitude, place.altitude.metres
-    return [Item(_BREACH_RETURN, ABOVE_HOME, _NO_PARAMETERS, *at)]
+    return [PlanItem(_BREACH_RETURN, ABOVE_HOME, _NO_PARAMETERS, *at)]
 
 
-def breach_return_place(items: Iterable[Item]) -> Position | None:
+def breach_return_place(items: Iterable[PlanItem]) -> Position | None:
     """Return the place to return to from a breach among items of MAV_MISSION_TYPE_FENCE."""
-    found = [one for one in items if one.command == _BREACH_RETURN]
+    found = [item for item in items if item.command == _BREACH_RETURN]
     return Position(found[0].latitude, found[0].longitude, AboveHome(found[0].z)) if found else None
 
 
-def rally_items(places: Iterable[Position]) -> list[Item]:
+def rally_items(places: Iterable[Position]) -> list[PlanItem]:
     """Return rally points as items of MAV_MISSION_TYPE_RALLY."""
     return [
-        Item(_RALLY, ABOVE_HOME, _NO_PARAMETERS, one.latitude, one.longitude, one.altitude.metres)
+        PlanItem(_RALLY, ABOVE_HOME, _NO_PARAMETERS, one.latitude, one.longitude, one.altitude.metres)
         for one in places
     ]
 
 
-def rally_places(items: Iterable[Item]) -> tuple[Position, ...]:
+def rally_places(items: Iterable[PlanItem]) -> tuple[Position, ...]:
     """Return the places in items of MAV_MISSION_TYPE_RALLY."""
-    return tuple(Position(one.latitude, one.longitude, AboveHome(one.z)) for one in items)
+    return tuple(Position(item.latitude, item.longitude, AboveHome(item.z)) for item in items)
 
 
 # -- as a file
@@ -289,7 +289,7 @@ def _plan_of_text(text: str) -> Plan:
     The columns are number, current, frame, command, seven parameters and continuation. The first row is home
     if it is a waypoint AMSL, as Mission Planner and MAVProxy write it; jumps count from there.
     """
-    items: list[Item] = []
+    items: list[PlanItem] = []
     for number, line in enumerate(text.splitlines()[1:], 2):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -299,7 +299,7 @@ def _plan_of_text(text: str) -> Plan:
             first, second, third, fourth, x, y, z = (float(word) for word in words[4:11])
         except (ValueError, IndexError):
             raise UsageError(f"line {number}: {line.strip()!r} is no item of a {_WPL} file") from None
-        items.append(Item(command, frame, (first, second, third, fourth), x, y, z))
+        items.append(PlanItem(command, frame, (first, second, third, fourth), x, y, z))
     at = items[0] if items and (items[0].command, items[0].frame) == (_WAYPOINT, 0) else None
     home = Position(at.latitude, at.longitude, AMSL(at.z)) if at and (at.latitude or at.longitude) else None
     first_number = 0 if at else 1
@@ -328,7 +328,7 @@ def _entries_of(one: Mapping[str, Any], number: int) -> list[Mapping[str, Any]]:
     return [entry for each in held for entry in _entries_of(each, number)]
 
 
-def _item_of(entry: Mapping[str, Any], number: int, places_by_id: Mapping[Any, int]) -> Item:
+def _item_of(entry: Mapping[str, Any], number: int, places_by_id: Mapping[Any, int]) -> PlanItem:
     """Return an item. *places_by_id*: the numbers of all by ``doJumpId``, empty if none states it."""
     first, second, third, fourth, x, y, z = (
         nan if value is None else float(value) for value in entry["params"]
@@ -341,7 +341,7 @@ def _item_of(entry: Mapping[str, Any], number: int, places_by_id: Mapping[Any, i
     x, y = (0.0 if isnan(value) else value for value in (x, y))
     if isnan(z) and not (has_global_place(command, frame) and (x or y)):
         z = 0.0
-    return Item(command, frame, (first, second, third, fourth), x, y, z)
+    return PlanItem(command, frame, (first, second, third, fourth), x, y, z)
 
 
 def _document_of(plan: Plan) -> dict[str, Any]:
@@ -386,7 +386,7 @@ def _document_of(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _entry_of(item: Item, number: int) -> dict[str, Any]:
+def _entry_of(item: PlanItem, number: int) -> dict[str, Any]:
     values = [*item.parameters, item.latitude, item.longitude, item.z]
     return {
         "AMSLAltAboveTerrain": None,

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.calibration.host_machine import this_machine
-from volery.calibration.ros.call_costs import Round, Sample
+from volery.calibration.ros.call_costs import ProbeSample, Round
 from volery.calibration.ros.campaign import CampaignLog, Conditions
 from volery.cli.main import application
 
@@ -57,17 +57,26 @@ def kept_round() -> Round:
     idle = 70_000.0
     once = {"init": 2e5, "node_handle": 2e6, "advertise": 2e5, "subscribe": 3e5, "connect": 1e6}
     once |= {"service_client": 1e4, "advertise_service": 4e4, "settle": 0.0}
-    samples = [Sample("nothing", 0, 1, 100, 0, 0)]
-    samples += [Sample(name, 0, 1, 100, round(ns), round(ns / 2)) for name, ns in once.items()]
-    samples += [Sample("sleep", us, 1, 100, round(2e4 + us), 5000) for us in (1e4, 1e5)]
+    samples = [ProbeSample("nothing", 0, 1, 100, 0, 0)]
+    samples += [ProbeSample(name, 0, 1, 100, round(ns), round(ns / 2)) for name, ns in once.items()]
+    samples += [ProbeSample("sleep", us, 1, 100, round(2e4 + us), 5000) for us in (1e4, 1e5)]
     for count in (1, 8):
         spent = round(idle + 7e4 + 2e4 * count)
-        samples.append(Sample("accept", count, 1, 100, round(2e5 + 5e5 * count), 0))
-        samples += [Sample("idle", 0, 1, 100, 70_000, 0), Sample("publish", count, 1, 100, spent, 70_000)]
-        samples.append(Sample("publish_alone", 0, 1, 100, round(idle), 0))
-        samples.append(Sample("publish_both", count, 1, 100, round(idle + 4e4 + 2e4 * count), 40_000))
-    samples += [Sample("spin_once_first", 0, 1, 100, 20_000, 0), Sample("spin_once", 0, 1, 100, 155_000, 0)]
-    samples += [Sample("wait", 0, 1, 10**9, 10**6, 0), Sample("receive", 0, 20, 10**9, 3 * 10**6, 0)]
+        samples.append(ProbeSample("accept", count, 1, 100, round(2e5 + 5e5 * count), 0))
+        samples += [
+            ProbeSample("idle", 0, 1, 100, 70_000, 0),
+            ProbeSample("publish", count, 1, 100, spent, 70_000),
+        ]
+        samples.append(ProbeSample("publish_alone", 0, 1, 100, round(idle), 0))
+        samples.append(ProbeSample("publish_both", count, 1, 100, round(idle + 4e4 + 2e4 * count), 40_000))
+    samples += [
+        ProbeSample("spin_once_first", 0, 1, 100, 20_000, 0),
+        ProbeSample("spin_once", 0, 1, 100, 155_000, 0),
+    ]
+    samples += [
+        ProbeSample("wait", 0, 1, 10**9, 10**6, 0),
+        ProbeSample("receive", 0, 20, 10**9, 3 * 10**6, 0),
+    ]
     return tuple(samples)
 
 

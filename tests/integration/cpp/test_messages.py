@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from volery.components.cpp.build import ClientLibrary, CppComponent, compile_component, operations
+from volery.components.cpp.build import CppComponent, LibraryHeaders, compile_component, operations
 from volery.components.cpp.cpp_program import CppObject, CppProgram
 from volery.kernel.virtual import VirtualKernel
 from volery.model.components import Argument, Interface, Signature
@@ -66,7 +66,7 @@ def echo(tmp_path: Path) -> Any:
     component = CppComponent(
         "Echo", tmp_path / "echo.cpp", "Echo", operations(ECHO), (), {"Echoing": ECHO}, ("-O0", "-g0")
     )
-    face = ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers)
+    face = LibraryHeaders((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers)
     kernel = VirtualKernel()
     made = CppProgram(kernel, "echo", compile_component(component, face)).make({})
     assert isinstance(made, CppObject)

@@ -9,7 +9,7 @@ import pytest
 from volery import Options, simulate
 from volery.base.errors import ModelError
 from volery.trace.events import Call, Message
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 pytestmark = pytest.mark.integration
 
@@ -52,7 +52,7 @@ def test_every_component_has_its_cost(fast):
 
 def test_vehicles_are_commanded_over_mavros_names_alone(fast):
     published, services, ports = set(), set(), set()
-    with Reading(fast.folder / "trace.mcap") as reading:
+    with OpenTrace(fast.folder / "trace.mcap") as reading:
         for event in reading.events({Message, Call}):
             if isinstance(event, Message):
                 published.add((event.publisher, event.topic))

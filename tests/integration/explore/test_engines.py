@@ -26,8 +26,14 @@ from rigs.small_campaigns import COUNT, DO, model, same_rows  # a fixture
 from volery.base.errors import VoleryError
 from volery.explore.campaign import Campaign
 from volery.explore.executors import EngineLostError
-from volery.explore.points import Point
-from volery.explore.run_process import Setting, Task, VersionMismatchError, execute, stop_processes
+from volery.explore.points import VariantPoint
+from volery.explore.run_process import (
+    CampaignSetting,
+    PlannedRun,
+    VersionMismatchError,
+    execute,
+    stop_processes,
+)
 
 pytestmark = pytest.mark.integration
 
@@ -97,7 +103,7 @@ def test_whatever_a_run_does_is_a_row(model, tmp_path):
     assert found["fill"] == ("over memory", "its process used more than its limit of 200 MB")
     assert rows["work"].observables["note.step.done"] == 3.0
     assert rows["work"].verdicts == {"counted": False}
-    (invalid,) = campaign.evaluate([Point({"platform.processors.pc.frequency": "9 GHz"}, 1)])
+    (invalid,) = campaign.evaluate([VariantPoint({"platform.processors.pc.frequency": "9 GHz"}, 1)])
     assert invalid.status == "invalid"
     assert "frequency" in invalid.reason
 
@@ -179,13 +185,13 @@ def test_a_full_disk_is_said_and_the_campaign_goes_on_when_there_is_room(undistu
 
 
 def test_a_worker_of_another_version_is_refused(model):
-    setting = Setting(str(model), version="0.0.9")
+    setting = CampaignSetting(str(model), version="0.0.9")
     with pytest.raises(
         VersionMismatchError, match=r"has volery .* the coordinator 0\.0\.9: install the same"
     ):
-        execute(Task(setting, 0, Point()))
+        execute(PlannedRun(setting, 0, VariantPoint()))
     with pytest.raises(VersionMismatchError, match=r"differs from the coordinator's .*, not beef"):
-        execute(Task(Setting(str(model), digest="beef"), 0, Point()))
+        execute(PlannedRun(CampaignSetting(str(model), digest="beef"), 0, VariantPoint()))
     stop_processes()
 
 

@@ -11,7 +11,7 @@ from rigs.flown_firmware import FlownFirmware
 from rigs.requirements import firmware_program
 from volery.base.time import S
 from volery.simulation.real_firmware.firmware_process import FirmwareError
-from volery.simulation.world.body_specs import Multirotor, Rover, frame_rotors
+from volery.simulation.world.body_specs import Multirotor, WheeledRover, frame_rotors
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_other_frames_fly(copter: Path, tmp_path: Path, frame: str) -> None:
 
 @pytest.mark.parametrize("skid", [False, True])
 def test_a_rover_drives(rover: Path, tmp_path: Path, skid: bool) -> None:
-    with FlownFirmware("ardupilot", rover, tmp_path, spec=Rover(skid=skid)) as flown:
+    with FlownFirmware("ardupilot", rover, tmp_path, spec=WheeledRover(skid=skid)) as flown:
         vehicle: Any = flown.open()
         with flown.as_script():
             vehicle.wait_ready()
@@ -72,7 +72,7 @@ def test_a_rover_drives(rover: Path, tmp_path: Path, skid: bool) -> None:
 def test_a_rover_is_fitted_to_its_body_and_turns_back_in_a_small_circle(
     rover: Path, tmp_path: Path, skid: bool
 ) -> None:
-    with FlownFirmware("ardupilot", rover, tmp_path, spec=Rover(skid=skid)) as flown:
+    with FlownFirmware("ardupilot", rover, tmp_path, spec=WheeledRover(skid=skid)) as flown:
         vehicle: Any = flown.open()
         way = []
         flown.kernel.every(S // 5, lambda: way.append(flown.flight.truth().position))

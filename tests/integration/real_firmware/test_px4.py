@@ -14,12 +14,16 @@ from volery.base.errors import Overridden
 from volery.base.time import MS, S
 from volery.links.in_process_link import in_process_pair
 from volery.simulation.real_firmware.firmware_process import FirmwareError
-from volery.simulation.world.body_specs import Battery, Multirotor, frame_rotors
+from volery.simulation.world.body_specs import BatteryPack, Multirotor, frame_rotors
 
 pytestmark = pytest.mark.integration
 PLAIN = Multirotor(sensors="perfect")
 HEXACOPTER = Multirotor(
-    frame="hexa-x", rotors=frame_rotors("hexa-x", 0.35), mass=4.5, sensors="perfect", battery=Battery(8.0, 4)
+    frame="hexa-x",
+    rotors=frame_rotors("hexa-x", 0.35),
+    mass=4.5,
+    sensors="perfect",
+    battery=BatteryPack(8.0, 4),
 )
 
 
@@ -92,7 +96,7 @@ def test_it_says_why_it_does_not_get_ready(
 ) -> None:
     monkeypatch.setattr("volery.simulation.real_firmware.lock_step.WARM_UP_LIMIT", 15 * S)
     parameters = {"COM_ARM_BAT_MIN": 0.5}
-    spec = Multirotor(battery=Battery(left=0.2))
+    spec = Multirotor(battery=BatteryPack(left=0.2))
     with (
         FlownFirmware("px4", program, tmp_path, spec=spec, parameters=parameters) as flown,
         pytest.raises(FirmwareError, match=r"drone_1: px4 does not get ready to arm: .*[Bb]attery"),

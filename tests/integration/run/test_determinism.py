@@ -11,7 +11,7 @@ import pytest
 
 from volery import Options, simulate
 from volery.trace.events import VehicleState
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 pytestmark = pytest.mark.integration
 
@@ -27,7 +27,7 @@ def digest(folder):
 
 
 def places(folder):
-    with Reading(folder / "trace.mcap") as reading:
+    with OpenTrace(folder / "trace.mcap") as reading:
         return [(state.x, state.y, state.z) for state in reading.events({VehicleState})]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from volery import Options, simulate
 from volery.trace.events import Collision, VehicleState
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "walls"
 
@@ -25,7 +25,7 @@ def test_a_drone_and_a_rover_hit_what_stands_in_their_way_and_one_passes_under_t
     ]
     verdicts = {name: verdict.observed for name, verdict in run.record.requirements.items()}
     assert verdicts == {"flies_free": 1.0, "passes_under": 0.0, "drives_free": 1.0}
-    with Reading(tmp_path / "run" / "trace.mcap") as reading:
+    with OpenTrace(tmp_path / "run" / "trace.mcap") as reading:
         events = list(reading.events({Collision, VehicleState}))
     hit = next(one for one in events if isinstance(one, Collision) and one.vehicle == "drone_1")
     assert hit.solid == "tower"

@@ -15,17 +15,17 @@ from volery.analysis.busy_windows import (
     executor_bounds,
     fifo_bound,
 )
-from volery.requirements.response_bounds import Demand, OneCore, response_bounds
+from volery.requirements.response_bounds import OneCore, TaskDemand, response_bounds
 
 
 def demand(cost, period, jitter=0, name="t"):
-    return Demand.periodic(name, 0, cost, period, jitter)
+    return TaskDemand.periodic(name, 0, cost, period, jitter)
 
 
 def fixed_priority(*tasks):
     """Bounds of (cost, period), the most urgent first."""
     demands = [
-        Demand.periodic(str(number), -number, cost, period) for number, (cost, period) in enumerate(tasks)
+        TaskDemand.periodic(str(number), -number, cost, period) for number, (cost, period) in enumerate(tasks)
     ]
     return list(response_bounds(demands, (), 1).values())
 

@@ -18,7 +18,7 @@ from volery.autonomy.markers import (
 )
 from volery.base.errors import UsageError
 from volery.ros.messages import new
-from volery.simulation.world.rasteriser import Lens, Rasteriser, View
+from volery.simulation.world.rasteriser import CameraView, Lens, Rasteriser
 from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker
 
 DOWN = np.diag((1.0, -1.0, -1.0))
@@ -31,7 +31,7 @@ CAMERA = CameraModel(
 
 def draw(family="36h11", *, at=(0.2, -0.3, 3.0), axes=DOWN, yaw=0.5, lux=DAY_LUX, seed=1):  # type: ignore[no-untyped-def]
     marker = Marker("pad", marker_cells(family, 7), (0.0, 0.0, 0.0), 0.4, yaw)
-    return Rasteriser(LENS, (), [marker], noise=np.uint64(seed)).draw(View(at, axes), 0.0, lux)
+    return Rasteriser(LENS, (), [marker], noise=np.uint64(seed)).draw(CameraView(at, axes), 0.0, lux)
 
 
 @pytest.mark.parametrize("family", ["36h11", "16h5", "aruco_4x4", "aruco_5x5", "aruco_6x6"])

@@ -30,7 +30,7 @@ from volery.ros.client_libraries.tf2.transform_tree import RigidTransform, write
 from volery.ros.graph import LATCHED, EmbeddedGraph, Node
 from volery.ros.messages import new
 from volery.ros.messages.bags import create_bag
-from volery.simulation.world.rasteriser import Lens, Rasteriser, View
+from volery.simulation.world.rasteriser import CameraView, Lens, Rasteriser
 from volery.simulation.world.scene import Solid
 
 LENS = Lens(320, 240, 160.0, (-0.1, 0.01, 0.0, 0.0, 0.0))  # a field of 90 degrees
@@ -66,7 +66,7 @@ def drawn(rasteriser: Rasteriser, pose: Pose2, number: int) -> Picture:
     whole = multiply(turn, MOUNTING.rotation)
     axes = [body_to_world(whole, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     at = pose.x + off[0], pose.y + off[1], HEIGHT + off[2]
-    return rasteriser.draw(View(at, np.array(axes).T), 0.0, k=number)
+    return rasteriser.draw(CameraView(at, np.array(axes).T), 0.0, k=number)
 
 
 def moved(number: int) -> RigidTransform:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from volery.autonomy.markers import MarkerPose
-from volery.autonomy.precision_landing import Landing, LandingRules, Phase, Sight, sight_of, step
+from volery.autonomy.precision_landing import LandingPhase, LandingRules, LandingState, Sight, sight_of, step
 from volery.base.errors import UsageError
 from volery.base.frames import Vector, euler_to_quaternion, world_to_body
 
@@ -30,15 +30,15 @@ class Flight:
     marker: Callable[[float], Vector] = lambda _time: (0.0, 0.0, 0.0)
     frozen_from: float = inf  # [s]: the pictures stay as they are
     push: Callable[[float], float] = lambda _time: 0.0  # acceleration to the east by gusts [m/s^2]
-    phases: list[Phase] = field(default_factory=list)
+    phases: list[LandingPhase] = field(default_factory=list)
     heights: list[float] = field(default_factory=list)
     sideways: list[float] = field(default_factory=list)
     reason: str = ""
 
-    def fly(self, seconds: float = 200.0) -> Phase:
+    def fly(self, seconds: float = 200.0) -> LandingPhase:
         random = np.random.default_rng(1)
         place, velocity, command = np.array(self.at), np.zeros(3), np.zeros(3)
-        landing, due, offset = Landing(), [], (0.0, 0.0, 0.0)
+        landing, due, offset = LandingState(), [], (0.0, 0.0, 0.0)
         for at in range(0, int(seconds * 1000), 20):
             velocity += (command - velocity) * 0.02 / 0.3
             velocity[0] += self.push(at / 1000) * 0.02
@@ -57,7 +57,7 @@ class Flight:
                 self.reason = wanted.reason
                 self.heights.append(float(place[2]))
                 self.sideways.append(abs(float(place[0])))
-                if wanted.phase in {Phase.LAND, Phase.ABORT}:
+                if wanted.phase in {LandingPhase.LAND, LandingPhase.ABORT}:
                     break
         self.at = tuple(place)
         return landing.phase
@@ -74,24 +74,24 @@ def in_view(_time: float, at: Vector) -> bool:
 
 def test_a_marker_that_is_always_seen_is_landed_on() -> None:
     flight = Flight()
-    assert flight.fly() is Phase.LAND
+    assert flight.fly() is LandingPhase.LAND
     assert flight.away < 0.08
     assert flight.at[2] < 0.5
-    assert flight.phases == [Phase.SEARCH, Phase.DESCEND, Phase.LAND]
+    assert flight.phases == [LandingPhase.SEARCH, LandingPhase.DESCEND, LandingPhase.LAND]
 
 
 def test_near_the_ground_it_goes_on_without_the_marker() -> None:
     flight = Flight(seen=in_view)
-    assert flight.fly() is Phase.LAND
+    assert flight.fly() is LandingPhase.LAND
     assert flight.away < 0.1
-    assert flight.phases[-2:] == [Phase.COMMIT, Phase.LAND]
+    assert flight.phases[-2:] == [LandingPhase.COMMIT, LandingPhase.LAND]
 
 
 def test_gusts_push_it_less_far_with_damping() -> None:
     def farthest(damping: float) -> float:
         rules = LandingRules(damping=damping)
         flight = Flight(at=(0.0, 0.0, 8.0), rules=rules, push=lambda time: 0.8 * sin(time))
-        assert flight.fly() is Phase.LAND
+        assert flight.fly() is LandingPhase.LAND
         return max(flight.sideways)
 
     assert farthest(0.5) < 0.8 * farthest(0.0)
@@ -99,28 +99,28 @@ def test_gusts_push_it_less_far_with_damping() -> None:
 
 def test_it_waits_while_it_is_outside_of_the_cone() -> None:
     flight = Flight(at=(4.0, 3.0, 5.0))
-    assert flight.fly() is Phase.LAND
+    assert flight.fly() is LandingPhase.LAND
     assert min(flight.heights[:40]) > 4.8, "first above the marker"
 
 
 def test_a_marker_that_is_hidden_for_a_while_is_found_again_from_higher_up() -> None:
     flight = Flight(seen=lambda time, at: in_view(time, at) and not 8.0 < time < 14.0)
-    assert flight.fly() is Phase.LAND
+    assert flight.fly() is LandingPhase.LAND
     assert flight.away < 0.1
-    assert flight.phases[2:5] == [Phase.WAIT, Phase.CLIMB, Phase.DESCEND]
+    assert flight.phases[2:5] == [LandingPhase.WAIT, LandingPhase.CLIMB, LandingPhase.DESCEND]
 
 
 def test_one_that_is_hidden_for_good_is_given_up_after_three_tries() -> None:
     flight = Flight(seen=lambda time, _at: time < 6.0)
-    assert flight.fly() is Phase.ABORT
-    assert flight.phases.count(Phase.CLIMB) == 3
+    assert flight.fly() is LandingPhase.ABORT
+    assert flight.phases.count(LandingPhase.CLIMB) == 3
     assert flight.reason.startswith("the marker was lost 4 times, last ")
 
 
 def test_without_a_marker_it_stays_and_says_so() -> None:
     flight = Flight(seen=lambda _time, _at: False)
     start = flight.at
-    assert flight.fly() is Phase.ABORT
+    assert flight.fly() is LandingPhase.ABORT
     assert flight.at == start
     assert flight.reason == "no marker was seen within 10 s"
 
@@ -128,32 +128,32 @@ def test_without_a_marker_it_stays_and_says_so() -> None:
 def test_a_frozen_camera_does_not_lead_it_into_the_ground() -> None:
     for frozen_from in (2.0, 5.0, 9.0):
         flight = Flight(frozen_from=frozen_from)
-        assert flight.fly() is Phase.ABORT
+        assert flight.fly() is LandingPhase.ABORT
         assert flight.reason == "the pictures stay the same while the vehicle moves: restart the camera"
         assert flight.at[2] > 0.5
 
 
 def test_a_camera_that_goes_black_is_a_marker_that_is_lost() -> None:
     flight = Flight(seen=lambda time, _at: time < 7.0)
-    assert flight.fly() is Phase.ABORT
+    assert flight.fly() is LandingPhase.ABORT
     assert "the marker was lost 4 times" in flight.reason
     assert flight.at[2] > 2.0, "it has climbed"
 
 
 def test_a_marker_that_moves_in_the_descent_is_followed() -> None:
     flight = Flight(marker=lambda time: (1.2, 0.0, 0.0) if time > 8.0 else (0.0, 0.0, 0.0))
-    assert flight.fly() is Phase.LAND
+    assert flight.fly() is LandingPhase.LAND
     assert hypot(flight.at[0] - 1.2, flight.at[1]) < 0.1
 
 
 def test_it_does_not_take_for_ever() -> None:
     flight = Flight(seen=lambda time, at: at[2] > 2.0, rules=LandingRules(tries=1000))
-    assert flight.fly() is Phase.ABORT
+    assert flight.fly() is LandingPhase.ABORT
     assert flight.reason == "not above the marker within 120 s"
 
 
 def test_a_sight_counts_at_the_time_of_its_picture() -> None:
-    landing, _ = step(Landing(), LandingRules(), 0, (2.0, 0.0, 0.0))
+    landing, _ = step(LandingState(), LandingRules(), 0, (2.0, 0.0, 0.0))
     for at in range(20, 520, 20):
         landing, _ = step(landing, LandingRules(), at * MS, (2.0, 0.0, 0.0))
     landing, _ = step(
@@ -163,7 +163,7 @@ def test_a_sight_counts_at_the_time_of_its_picture() -> None:
 
 
 def test_a_single_false_sight_is_refused_and_a_marker_that_was_moved_is_believed() -> None:
-    landing, rules = Landing(), LandingRules()
+    landing, rules = LandingState(), LandingRules()
     good, false = (Sight(0, (0.0, north, -4.0), (0.02, 0.02, 0.02)) for north in (0.0, 3.0))
     for at in range(10):
         landing, _ = step(landing, rules, at * 100 * MS, (0.0, 0.0, 0.0), good._replace(at=at * 100 * MS))

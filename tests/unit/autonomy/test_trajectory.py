@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autonomy.trajectory import Limits, Trajectory
+from volery.autonomy.trajectory import Trajectory, TrajectoryLimits
 from volery.base.errors import UsageError
 from volery.base.time import MS
 
@@ -32,7 +32,7 @@ def test_limits_hold_at_every_moment(
     points: list[tuple[float, ...]], speed: float, acceleration: float, deviation: float
 ) -> None:
     path = np.array(points)
-    way = Trajectory(path, Limits(speed, acceleration, deviation))
+    way = Trajectory(path, TrajectoryLimits(speed, acceleration, deviation))
     step = max(way.duration / 400.0, 1e-3)
     times = np.arange(0.0, way.duration + 2.0 * step, step)
     places, velocities = (np.array(column) for column in zip(*map(way.at, times), strict=True))
@@ -49,17 +49,17 @@ def test_limits_hold_at_every_moment(
 
 
 def test_a_straight_way_takes_the_time_of_a_trapezoid() -> None:
-    way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0))), Limits(4.0, 2.0))
+    way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0))), TrajectoryLimits(4.0, 2.0))
     assert way.duration == pytest.approx(2.0 + 2.0 + 12.0 / 4.0)
     assert way.at(3.0)[0] == pytest.approx((8.0, 0.0))
-    short = Trajectory(np.array(((0.0, 0.0), (2.0, 0.0))), Limits(4.0, 2.0))
+    short = Trajectory(np.array(((0.0, 0.0), (2.0, 0.0))), TrajectoryLimits(4.0, 2.0))
     assert short.duration == pytest.approx(2.0)
 
 
 def test_a_corner_is_flown_slower_the_sharper_it_is() -> None:
     def slowest(angle: float) -> float:
         end = (20.0 + 20.0 * np.cos(angle), 20.0 * np.sin(angle))
-        way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0), end)), Limits(5.0, 2.0))
+        way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0), end)), TrajectoryLimits(5.0, 2.0))
         middle = np.linspace(0.3, 0.7, 400) * way.duration
         return float(min(np.sqrt((way.at(time)[1] ** 2).sum()) for time in middle))
 
@@ -70,22 +70,24 @@ def test_a_corner_is_flown_slower_the_sharper_it_is() -> None:
 
 
 def test_without_deviation_it_stops_at_the_corner() -> None:
-    way = Trajectory(np.array(((0.0, 0.0), (4.0, 0.0), (4.0, 4.0))), Limits(5.0, 1.0, 0.0))
+    way = Trajectory(np.array(((0.0, 0.0), (4.0, 0.0), (4.0, 4.0))), TrajectoryLimits(5.0, 1.0, 0.0))
     assert way.duration == pytest.approx(8.0)
     assert way.at(4.0)[0] == pytest.approx((4.0, 0.0))
     assert way.at(4.0)[1] == pytest.approx((0.0, 0.0))
 
 
 def test_points_that_repeat_are_one() -> None:
-    twice = Trajectory(np.array(((0.0, 0.0), (0.0, 0.0), (4.0, 0.0), (4.0, 0.0))), Limits(5.0, 1.0))
-    assert twice.duration == Trajectory(np.array(((0.0, 0.0), (4.0, 0.0))), Limits(5.0, 1.0)).duration
-    nowhere = Trajectory(np.array(((1.0, 2.0, 3.0),)), Limits(5.0, 1.0))
+    twice = Trajectory(np.array(((0.0, 0.0), (0.0, 0.0), (4.0, 0.0), (4.0, 0.0))), TrajectoryLimits(5.0, 1.0))
+    assert (
+        twice.duration == Trajectory(np.array(((0.0, 0.0), (4.0, 0.0))), TrajectoryLimits(5.0, 1.0)).duration
+    )
+    nowhere = Trajectory(np.array(((1.0, 2.0, 3.0),)), TrajectoryLimits(5.0, 1.0))
     assert nowhere.duration == 0.0
     assert nowhere.at(3.0)[0] == pytest.approx((1.0, 2.0, 3.0))
 
 
 def test_samples_have_times_and_include_the_end() -> None:
-    way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0))), Limits(4.0, 2.0))
+    way = Trajectory(np.array(((0.0, 0.0), (20.0, 0.0))), TrajectoryLimits(4.0, 2.0))
     samples = way.samples(300 * MS)
     assert [one.time for one in samples[:3]] == [0, 300 * MS, 600 * MS]
     assert samples[-1].position == pytest.approx((20.0, 0.0))
@@ -94,10 +96,10 @@ def test_samples_have_times_and_include_the_end() -> None:
 
 def test_wrong_input_is_named() -> None:
     with pytest.raises(UsageError, match="above 0"):
-        Limits(0.0, 1.0)
+        TrajectoryLimits(0.0, 1.0)
     with pytest.raises(UsageError, match="above 0"):
-        Limits(1.0, float("nan"))
+        TrajectoryLimits(1.0, float("nan"))
     with pytest.raises(UsageError, match="finite"):
-        Trajectory(np.array(((0.0, np.nan), (1.0, 1.0))), Limits(1.0, 1.0))
+        Trajectory(np.array(((0.0, np.nan), (1.0, 1.0))), TrajectoryLimits(1.0, 1.0))
     with pytest.raises(UsageError, match="at least one point"):
-        Trajectory(np.zeros((0, 2)), Limits(1.0, 1.0))
+        Trajectory(np.zeros((0, 2)), TrajectoryLimits(1.0, 1.0))

@@ -9,7 +9,7 @@ import pytest
 
 from volery.base import files
 from volery.base.errors import ModelError, UsageError
-from volery.base.files import Output, create_file, read_text, write_text
+from volery.base.files import RecordFile, create_file, read_text, write_text
 from volery.model.assembly import Selection, assemble
 from volery.run.assembly.fences import read_fence
 from volery.run.recording import make_folder
@@ -32,7 +32,7 @@ def test_nothing_is_written_through_a_link(tmp_path: Path, exists: bool) -> None
     with pytest.raises(OSError, match="symbolic link"):
         create_file(link)
     with pytest.raises(UsageError, match="it is a symbolic link"):
-        Output(link)
+        RecordFile(link)
     assert target.exists() == exists
     assert not exists or target.read_text() == "precious"
 

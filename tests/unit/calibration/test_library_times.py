@@ -8,7 +8,7 @@ from volery.base.errors import UsageError
 from volery.calibration.library_times import (
     COLD_NS,
     WARM,
-    Snippet,
+    TimedCall,
     _of_feature,
     context_factors,
     features,
@@ -59,9 +59,9 @@ def test_what_cannot_be_measured_by_itself_is_named() -> None:
 
 
 def test_a_feature_takes_what_a_call_takes_beyond_its_price(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Snippet, "nanoseconds", lambda self: 700.0)
+    monkeypatch.setattr(TimedCall, "nanoseconds", lambda self: 700.0)
     law = LibraryCall(size="text", points={5: 100.0}, each={"lines": 999.0, "values": 50.0})
-    one = Snippet("json.loads", "lines", lambda text: None, ("a,\n\n\n",))
+    one = TimedCall("json.loads", "lines", lambda text: None, ("a,\n\n\n",))
     assert _of_feature(one, law) == pytest.approx((700.0 - 100.0 - 50.0) / 3)
     assert _of_feature(one._replace(size=WRAPPED), law) == pytest.approx(700.0 - 100.0 - 50.0 - 3 * 999.0)
 

@@ -12,7 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from volery.cli.command import Commands, resend_lost_interrupts
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 
 
 @pytest.fixture
@@ -57,13 +57,13 @@ def test_the_fields_of_a_dataclass_are_options():
     commands, seen = Commands(), []
 
     @commands.add("quiet")
-    def climb(output: Output, shared: Shared, name: str = "one") -> int:
+    def climb(output: CommandOutput, shared: Shared, name: str = "one") -> int:
         """Climb."""
         seen.append((shared, name))
         return 0
 
     @commands.add("quiet")
-    def descend(output: Output, shared: Shared) -> int:
+    def descend(output: CommandOutput, shared: Shared) -> int:
         """Descend."""
         seen.append(shared)
         return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from volery.cli.console import LONGEST_ERROR, Output, make_table, printable
+from volery.cli.console import LONGEST_ERROR, CommandOutput, make_table, printable
 
 EVIL = "\x1b]0;PWN\x07\x1b[2J\x9b2J\x7f\u202e name"
 
@@ -14,13 +14,13 @@ def test_no_control_character_of_a_name_reaches_the_terminal(
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm-256color")
-    output = Output()
+    output = CommandOutput()
     table = make_table("name")
     table.add_row(EVIL)
     output.show(EVIL, table)
     output.note(EVIL)
     output.complain(EVIL)
-    Output(json=True).give(EVIL)
+    CommandOutput(json=True).give(EVIL)
     written = capfd.readouterr()
     assert "\x1b[31m" in written.err, "the colours of volery itself are kept"
     for text in written:
@@ -32,13 +32,13 @@ def test_no_control_character_of_a_name_reaches_the_terminal(
 
 def test_no_text_of_others_is_markup_or_an_emoji(capfd: pytest.CaptureFixture[str]) -> None:
     text = "model.yaml:100: no 'garag' [bold]here[/bold] :warning: [/]"
-    output = Output()
+    output = CommandOutput()
     table = make_table("name", title=text)
     table.add_row(text)
     output.show(text, table)
     output.note(text)
     output.complain(text)
-    Output(json=True).give(text)
+    CommandOutput(json=True).give(text)
     written = capfd.readouterr()
     assert written.out.count(text) == 4
     assert written.err.count(text) == 2
@@ -49,5 +49,5 @@ def test_lines_and_tabs_stay() -> None:
 
 
 def test_a_very_long_error_is_cut(capfd: pytest.CaptureFixture[str]) -> None:
-    Output().complain("volery: " + "9" * 1_000_000)
+    CommandOutput().complain("volery: " + "9" * 1_000_000)
     assert len(capfd.readouterr().err) < LONGEST_ERROR + 100

@@ -19,8 +19,8 @@ from volery.base.errors import (
     UsageError,
 )
 from volery.cli.command import BAD_INPUT, FAILED, LEFT_OUT, OK, exit_status
-from volery.cli.commands.first_steps import PARTS, Part, doctor, example, module, program
-from volery.cli.console import Output
+from volery.cli.commands.first_steps import PARTS, InstallablePart, doctor, example, module, program
+from volery.cli.console import CommandOutput
 from volery.cli.main import application
 from volery.cli.run_display import next_folder
 
@@ -52,7 +52,7 @@ def test_what_a_command_raises_becomes_a_status_and_a_message(error, status, cap
     def command() -> int:
         raise error
 
-    assert exit_status(Output(quiet=True), command) == status
+    assert exit_status(CommandOutput(quiet=True), command) == status
     said = capsys.readouterr()
     assert said.err.startswith("volery: ")
     assert "Traceback" not in said.err
@@ -60,7 +60,7 @@ def test_what_a_command_raises_becomes_a_status_and_a_message(error, status, cap
 
 
 def test_debug_shows_where(capsys):
-    assert exit_status(Output(debug=True), lambda: 1 // 0) == FAILED
+    assert exit_status(CommandOutput(debug=True), lambda: 1 // 0) == FAILED
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
@@ -377,7 +377,7 @@ def test_an_example_that_is_not_there():
 
 
 def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
-    assert doctor(Output()) == OK
+    assert doctor(CommandOutput()) == OK
     assert "every necessary part is installed" in capsys.readouterr().out
     assert all(part.get for part in PARTS)
     assert module("no_such_module_anywhere")() == ""
@@ -390,7 +390,7 @@ def test_doctor_shows_programs_of_real_firmware_or_how_to_build_them(capsys, mon
     copter.chmod(0o755)
     monkeypatch.setenv("VOLERY_ARDUCOPTER", str(copter))
     monkeypatch.setenv("VOLERY_PX4", str(tmp_path / "nowhere"))
-    assert doctor(Output()) == OK
+    assert doctor(CommandOutput()) == OK
     said = "".join(capsys.readouterr().out.split())
     assert f"✓arducopter{copter}" in said
     assert "·px4missing" in said
@@ -398,9 +398,9 @@ def test_doctor_shows_programs_of_real_firmware_or_how_to_build_them(capsys, mon
 
 
 def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
-    lost = Part("gyro", lambda: "", "everything", "pip install gyro", needed=True)
+    lost = InstallablePart("gyro", lambda: "", "everything", "pip install gyro", needed=True)
     monkeypatch.setattr("volery.cli.commands.first_steps.PARTS", (lost,))
-    assert doctor(Output()) == FAILED
+    assert doctor(CommandOutput()) == FAILED
     said = capsys.readouterr().out
     assert "pip install gyro" in said
     assert "missing: gyro" in said

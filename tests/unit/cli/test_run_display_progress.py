@@ -5,11 +5,11 @@ import io
 from rich.console import Console
 
 from volery.base.time import MINUTE, S
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.run_display import LINE_PERIOD_S, LineProgress, draw_progress, run_progress
-from volery.run.result import Progress, VehicleProgress
+from volery.run.result import RunProgress, VehicleProgress
 
-PROGRESS = Progress(
+PROGRESS = RunProgress(
     83 * S,
     15 * MINUTE,
     (VehicleProgress("drone_1", "GUIDED", True, 24.96), VehicleProgress("rover_1", "HOLD", False, 0.0)),
@@ -34,13 +34,13 @@ def test_it_tells_time_speed_vehicles_and_notes():
 
 
 def test_nothing_is_shown_quietly():
-    with run_progress(Output(quiet=True, notes=Console(file=io.StringIO())), "x") as show:
+    with run_progress(CommandOutput(quiet=True, notes=Console(file=io.StringIO())), "x") as show:
         assert show is None
 
 
 def test_a_pipe_gets_a_line_now_and_then():
     said, now = io.StringIO(), [0.0]
-    lines = LineProgress(Output(notes=Console(file=said)), lambda: now[0])
+    lines = LineProgress(CommandOutput(notes=Console(file=said)), lambda: now[0])
     for now[0] in (1.0, LINE_PERIOD_S, LINE_PERIOD_S + 1.0):
         lines.show("delivery", PROGRESS)
     assert said.getvalue() == (
@@ -51,6 +51,8 @@ def test_a_pipe_gets_a_line_now_and_then():
 
 def test_a_terminal_is_drawn_on():
     screen = io.StringIO()
-    with run_progress(Output(notes=Console(file=screen, force_terminal=True, width=100)), "delivery") as show:
+    with run_progress(
+        CommandOutput(notes=Console(file=screen, force_terminal=True, width=100)), "delivery"
+    ) as show:
         show(PROGRESS)
     assert "drone_1" in screen.getvalue()

@@ -13,8 +13,8 @@ import pytest
 from volery.base.errors import ComponentError, ModelError, UsageError
 from volery.base.time import S
 from volery.components.entry_points import EntryPoint, entry_points, find_executable
-from volery.components.instance import Allocation, Instance
-from volery.components.loader import Host, Loader, parse
+from volery.components.instance import Allocation, RunningInstance
+from volery.components.loader import Loader, ScriptHost, parse
 from volery.components.programs import load_program, script_or_class, start
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost.instrumentation import StepCounter
@@ -24,7 +24,7 @@ from volery.ros.messages import Workspace, modules
 from volery.trace.events import Failure, Text
 
 
-class RecordingHost(Host):
+class RecordingHost(ScriptHost):
     """Calls what is left when a component ends, as a run does, and keeps it."""
 
     def __init__(self, kernel):
@@ -71,7 +71,7 @@ class Workbench:
 
     def start(self, path, name="node", function="", arguments=()):
         program = load_program(self.loader, name, path, "", arguments=arguments, function=function)
-        instance = Instance(self.kernel, name, Allocation(priority=0))
+        instance = RunningInstance(self.kernel, name, Allocation(priority=0))
         start(instance, program, {}, self.kernel.root, lambda *failure: self.failures.append(failure))
         return instance
 

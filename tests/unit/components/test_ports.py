@@ -9,8 +9,8 @@ import pytest
 
 from volery.base.errors import ComponentError, EstimateError, UsageError
 from volery.base.time import MS, Ns, S
-from volery.components.instance import COMPONENT_MARK, Allocation, Instance
-from volery.components.ports import HEADER_BYTES, Port, PortList, size_of
+from volery.components.instance import COMPONENT_MARK, Allocation, RunningInstance
+from volery.components.ports import HEADER_BYTES, ComponentPort, PortList, size_of
 from volery.components.programs import start
 from volery.cost.pricing import FREE, Cost, StatedPricing
 from volery.kernel import waiting
@@ -48,7 +48,7 @@ class Bench:
         self.failures = []
 
     def instance(self, name, thing, seat, pricing=None, operations=()):
-        instance = Instance(self.kernel, name, seat, pricing or FREE, operations)
+        instance = RunningInstance(self.kernel, name, seat, pricing or FREE, operations)
         self.things = {**getattr(self, "things", {}), name: (instance, thing)}
         return instance
 
@@ -104,9 +104,9 @@ def test_nested_calls_over_two_processors_under_preemption():
     bench = Bench()
     kernel = bench.kernel
     c = bench.instance("c", Doing(kernel, []), Allocation(bench.onboard), free(work=2), ("work",))
-    to_c = Port(kernel, "b", c, bench.travel(3 * MS), bench.travel(3 * MS))
+    to_c = ComponentPort(kernel, "b", c, bench.travel(3 * MS), bench.travel(3 * MS))
     b = bench.instance("b", Doing(kernel, [to_c.work, 1]), Allocation(bench.ground), free(work=3), ("work",))
-    to_b = Port(kernel, "a", b, bench.travel(3 * MS), bench.travel(3 * MS))
+    to_b = ComponentPort(kernel, "a", b, bench.travel(3 * MS), bench.travel(3 * MS))
     bench.instance("a", Doing(kernel, [4, to_b.work, 1]), Allocation(bench.onboard, priority=1), free())
 
     def urgent(processor, at, amount):
@@ -138,7 +138,7 @@ def test_one_caller_at_a_time_by_priority():
     ends = []
 
     def caller(name, priority, at):
-        port = Port(kernel, name, shared, None, None)
+        port = ComponentPort(kernel, name, shared, None, None)
         doing = Doing(
             kernel,
             [
@@ -175,7 +175,7 @@ def test_a_call_has_the_callers_priority_unless_the_callee_states_one():
     active = bench.instance(
         "active", Looking("active"), Allocation(bench.ground, priority=3), free(look=0), ("look",)
     )
-    ports = [Port(kernel, "caller", callee, None, None) for callee in (passive, active)]
+    ports = [ComponentPort(kernel, "caller", callee, None, None) for callee in (passive, active)]
     bench.instance(
         "caller", Doing(kernel, [port.look for port in ports]), Allocation(bench.ground, priority=8), free()
     )
@@ -199,7 +199,7 @@ def test_arguments_and_results_are_copied_between_processors_only(far):
     bench = Bench()
     keeper = Keeper()
     kept = bench.instance("keeper", keeper, Allocation(bench.ground), free(keep=0), ("keep",))
-    port = Port(bench.kernel, "caller", kept, None, None)
+    port = ComponentPort(bench.kernel, "caller", kept, None, None)
     mine = {"list": [1]}
     returned = []
     place = bench.onboard if far else bench.ground
@@ -219,7 +219,7 @@ def test_a_value_that_cannot_be_copied_cannot_be_sent_to_another_processor():
     bench = Bench()
     kernel = bench.kernel
     keeper = bench.instance("keeper", Keeper(), Allocation(bench.ground), free(keep=0), ("keep",))
-    port = Port(kernel, "caller", keeper, None, None)
+    port = ComponentPort(kernel, "caller", keeper, None, None)
     said = []
 
     def attempt(thing):
@@ -258,11 +258,11 @@ def test_an_error_of_a_callee_names_it_and_leaves_it_usable():
     bench = Bench()
     kernel = bench.kernel
     faulty = bench.instance("faulty", Faulty(kernel), Allocation(bench.ground), free(boom=0), ("boom",))
-    middle_port = Port(kernel, "middle", faulty, None, None)
+    middle_port = ComponentPort(kernel, "middle", faulty, None, None)
     middle = bench.instance(
         "middle", Faulty(kernel, middle_port), Allocation(bench.ground), free(pass_on=0), ("pass_on",)
     )
-    port = Port(kernel, "caller", middle, None, None)
+    port = ComponentPort(kernel, "caller", middle, None, None)
     caught = []
 
     def attempt():
@@ -287,7 +287,7 @@ def test_a_call_that_the_callee_does_not_take_is_the_line_of_the_caller(monkeypa
     monkeypatch.setitem(globals(), COMPONENT_MARK, True)  # these lines are component code
     bench = Bench()
     faulty = bench.instance("faulty", Faulty(bench.kernel), Allocation(bench.ground), free(boom=0), ("boom",))
-    port = Port(bench.kernel, "caller", faulty, None, None)
+    port = ComponentPort(bench.kernel, "caller", faulty, None, None)
 
     def call():
         port.boom("too", "much")
@@ -301,7 +301,7 @@ def test_a_call_that_the_callee_does_not_take_is_the_line_of_the_caller(monkeypa
 def test_an_uncaught_error_ends_the_caller_and_is_reported():
     bench = Bench()
     faulty = bench.instance("faulty", Faulty(bench.kernel), Allocation(bench.ground), free(boom=0), ("boom",))
-    port = Port(bench.kernel, "caller", faulty, None, None)
+    port = ComponentPort(bench.kernel, "caller", faulty, None, None)
     bench.instance("caller", Doing(bench.kernel, [port.boom]), Allocation(bench.onboard, priority=0), free())
     bench.run()
     [(who, error)] = bench.failures
@@ -316,7 +316,7 @@ def test_cancellation_passes_through_except_exception_and_frees_the_callee():
     seen = []
     faulty = Faulty(kernel)
     callee = bench.instance("callee", faulty, Allocation(bench.ground), free(wait=0), ("wait",))
-    port = Port(kernel, "caller", callee, None, None)
+    port = ComponentPort(kernel, "caller", callee, None, None)
 
     def body():
         try:
@@ -373,8 +373,8 @@ def test_calls_wait_for_the_constructor():
             waiting.sleep(kernel, 50 * MS)
             return Keeper()
 
-    slow = Instance(kernel, "slow", Allocation(bench.ground), free(keep=0), ("keep",))
-    port = Port(kernel, "caller", slow, None, None)
+    slow = RunningInstance(kernel, "slow", Allocation(bench.ground), free(keep=0), ("keep",))
+    port = ComponentPort(kernel, "caller", slow, None, None)
     bench.instance(
         "caller",
         Doing(kernel, [lambda: log.append((port.keep(1), kernel.now() / MS))]),
@@ -396,9 +396,9 @@ def test_a_call_of_a_component_without_an_object_names_it():
             raise RuntimeError("no camera")
 
     failures = []
-    broken = Instance(kernel, "broken", Allocation(bench.ground), free(keep=0), ("keep",))
+    broken = RunningInstance(kernel, "broken", Allocation(bench.ground), free(keep=0), ("keep",))
     start(broken, Broken(None), {}, kernel.root, lambda *args: failures.append(args))
-    port = Port(kernel, "caller", broken, None, None)
+    port = ComponentPort(kernel, "caller", broken, None, None)
     bench.instance("caller", Doing(kernel, [lambda: port.keep(1)]), Allocation(None, priority=0))
     bench.run()
     assert "its constructor raised RuntimeError: no camera" in str(failures[0][1])
@@ -408,7 +408,7 @@ def test_a_call_of_a_component_without_an_object_names_it():
 def test_an_unknown_operation_lists_the_valid_ones():
     bench = Bench()
     keeper = bench.instance("keeper", Keeper(), Allocation(), free(keep=0), ("keep",))
-    port = Port(bench.kernel, "caller", keeper, None, None)
+    port = ComponentPort(bench.kernel, "caller", keeper, None, None)
     with pytest.raises(
         AttributeError, match="keeper provides no operation 'kepp' \\(did you mean 'keep'\\?\\): keep"
     ):
@@ -421,7 +421,7 @@ def test_a_port_list_is_read_by_index_and_by_name():
     bench = Bench()
     ports = PortList(
         [
-            Port(
+            ComponentPort(
                 bench.kernel,
                 "caller",
                 bench.instance(name, Keeper(), Allocation(), None, ("keep",)),
@@ -442,7 +442,7 @@ def test_the_network_receives_the_size_of_arguments_and_result():
     bench = Bench()
     sizes = []
     keeper = bench.instance("keeper", Keeper(), Allocation(bench.ground), free(keep=0), ("keep",))
-    port = Port(bench.kernel, "caller", keeper, sizes.append, sizes.append)
+    port = ComponentPort(bench.kernel, "caller", keeper, sizes.append, sizes.append)
     bench.instance(
         "caller",
         Doing(bench.kernel, [lambda: port.keep("äb")]),
@@ -483,10 +483,10 @@ def test_calls_work_on_the_wall_clock():
     events, results = [], []
     kernel = WallKernel(record=events.append)
     keeper = Keeper()
-    callee = Instance(kernel, "keeper", Allocation(), FREE, ("keep",))
-    caller = Instance(kernel, "caller", Allocation(priority=0))
-    faulty = Instance(kernel, "faulty", Allocation(), FREE, ("boom",))
-    port, broken = (Port(kernel, "caller", one, None, None) for one in (callee, faulty))
+    callee = RunningInstance(kernel, "keeper", Allocation(), FREE, ("keep",))
+    caller = RunningInstance(kernel, "caller", Allocation(priority=0))
+    faulty = RunningInstance(kernel, "faulty", Allocation(), FREE, ("boom",))
+    port, broken = (ComponentPort(kernel, "caller", one, None, None) for one in (callee, faulty))
 
     class Body:
         def run(self):

@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import ComponentError, Location, ModelError, UsageError
 from volery.base.time import MS, S
 from volery.components import component_api
-from volery.components.instance import Allocation, Instance
+from volery.components.instance import Allocation, RunningInstance
 from volery.components.loader import Loader
 from volery.components.programs import StubProgram, load_class, load_function, load_program, neutral, start
 from volery.components.virtual_stdlib import virtual_modules
@@ -45,7 +45,7 @@ class Desk:
 
     def start(self, path, class_name="", name="user", **given):
         operations = given.pop("operations", ())
-        instance = Instance(self.kernel, name, given.pop("seat", self.seat), operations=operations)
+        instance = RunningInstance(self.kernel, name, given.pop("seat", self.seat), operations=operations)
         program = load_program(self.loader, name, path, class_name)
         start(instance, program, given, self.kernel.root, lambda *failure: self.failures.append(failure))
         return instance
@@ -314,7 +314,7 @@ def test_counted_code_is_charged_and_takes_its_time(tmp_path):
                     time.sleep(1)
         """,
     )
-    instance = Instance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), read_steps=steps.take)
+    instance = RunningInstance(desk.kernel, "loop", desk.seat, CountedPricing(1000.0), read_steps=steps.take)
     program = load_program(loader, "loop", path, "Loop")
     start(instance, program, {}, desk.kernel.root, lambda *failure: desk.failures.append(failure))
     desk.kernel.run(10 * S)
@@ -338,7 +338,7 @@ def test_a_stub_returns_neutral_values():
 
 
 def test_an_active_stub_is_released_each_period(desk):
-    instance = Instance(desk.kernel, "stub", desk.seat)
+    instance = RunningInstance(desk.kernel, "stub", desk.seat)
     program = StubProgram(desk.kernel, {}, 100 * MS)
     start(instance, program, {}, desk.kernel.root, print)
     desk.kernel.run(250 * MS)

@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 from volery.base.time import MS, S
-from volery.components.instance import Allocation, Instance
+from volery.components.instance import Allocation, RunningInstance
 from volery.components.loader import Loader
 from volery.components.programs import load_program, start
 from volery.components.virtual_stdlib import EPOCH, virtual_modules
@@ -32,7 +32,7 @@ def run(tmp_path):
         log.tell = reported.append
         loader = Loader({**virtual_modules(kernel, seed), "log": log})
         for name in names:
-            instance = Instance(kernel, name, Allocation(priority=0))
+            instance = RunningInstance(kernel, name, Allocation(priority=0))
             start(instance, load_program(loader, name, path, "User"), {}, kernel.root, lambda *failed: None)
         kernel.run(seconds * S)
         assert kernel.close() == []
@@ -272,7 +272,7 @@ def test_an_error_of_a_thread_is_a_failure_of_the_component(tmp_path):
     )
     failed = []
     kernel = VirtualKernel()
-    instance = Instance(kernel, "user", Allocation(priority=0))
+    instance = RunningInstance(kernel, "user", Allocation(priority=0))
     program = load_program(Loader(virtual_modules(kernel, 1)), "user", path, "User")
     start(instance, program, {}, kernel.root, lambda *failure: failed.append(failure))
     kernel.run(S)

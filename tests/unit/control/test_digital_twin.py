@@ -15,13 +15,13 @@ from volery.base.errors import UsageError
 from volery.base.time import MS
 from volery.control.digital_twin import (
     RecordedReference,
-    Reference,
     Twin,
+    TwinReference,
     recorded_reference,
     tracking_errors,
 )
 from volery.control.log_signals import read_signals
-from volery.control.step_response import Signal, make_signal
+from volery.control.step_response import ControlledSignal, make_signal
 from volery.links.frame import Frame
 from volery.ros import messages
 from volery.ros.messages.bags import create_bag
@@ -29,7 +29,7 @@ from volery.ros.messages.bags import create_bag
 TIMES = np.arange(0.0, 40.0, 0.1)
 
 
-def record(height: float = 6.0) -> list[Signal]:
+def record(height: float = 6.0) -> list[ControlledSignal]:
     up = np.clip(TIMES - 5.0, 0.0, height)
     north = 100.0 + np.clip(TIMES - 15.0, 0.0, 10.0)
     yaw = np.where(TIMES < 20.0, 350.0, (350.0 + np.clip(TIMES - 20.0, 0.0, 2.0) * 15.0) % 360.0)
@@ -119,7 +119,7 @@ def test_a_twin_follows_a_record() -> None:
         if one.controller == "twin":
             loops.setdefault(one.loop, []).append(one)
     signals = [
-        Signal(
+        ControlledSignal(
             name,
             rows[0].unit,
             np.array([one.at / 1e9 for one in rows]),
@@ -139,7 +139,7 @@ def test_a_twin_follows_a_record() -> None:
 def test_a_twin_that_is_far_behind_brakes_before_its_reference() -> None:
     """50 m behind a reference that stands: at 8 m/s it would pass it by far."""
     flown = fly_watched(
-        lambda: Twin(lambda elapsed: Reference(0.0, 50.0, 0.0, 5.0) if elapsed < 25.0 else None),
+        lambda: Twin(lambda elapsed: TwinReference(0.0, 50.0, 0.0, 5.0) if elapsed < 25.0 else None),
         limit_s=120.0,
     )
     assert flown.error is None
@@ -149,9 +149,9 @@ def test_a_twin_that_is_far_behind_brakes_before_its_reference() -> None:
 
 
 def test_without_a_reference_the_twin_hovers() -> None:
-    twin = Twin(lambda _: Reference(nan, nan, nan, nan, nan, nan, nan))
-    from volery.control.actuation import Measured
+    twin = Twin(lambda _: TwinReference(nan, nan, nan, nan, nan, nan, nan))
+    from volery.control.actuation import MeasuredState
 
-    command, _ = twin.step(Measured(10.0, 1.0, 2.0, 5.0, 0.0, 0.0, 0.0), 0.05)
+    command, _ = twin.step(MeasuredState(10.0, 1.0, 2.0, 5.0, 0.0, 0.0, 0.0), 0.05)
     assert tuple(command)[:2] == (0.0, 0.0)
     assert command.yaw_rate == 0.0

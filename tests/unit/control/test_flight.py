@@ -10,11 +10,11 @@ import pytest
 from rigs.controlled_flights import Watched, fly_watched
 from volery.base.errors import LinkLost, NotArrived, OffTrack, Refused, UsageError
 from volery.base.time import from_seconds
-from volery.control.actuation import RC_SCALES, Command, RcAxis
+from volery.control.actuation import RC_SCALES, MotionCommand, RcAxis
 from volery.control.flight import limited_descent
 from volery.control.laws import PidGains, wrap
 from volery.control.manoeuvres import Altitude, Rotation, Waypoints, cube, set_gains
-from volery.control.safety_switch import Emergency, Reaction, SwitchSettings
+from volery.control.safety_switch import Emergency, SafetyReaction, SwitchSettings
 from volery.simulation.autopilots.px4.flight_modes import apply_expo
 from volery.vehicles import Drone
 
@@ -111,9 +111,10 @@ def test_without_the_middle_position_nothing_starts(pulse: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("reaction", "authority"), [(Reaction.LAND, "emergency landing"), (Reaction.RELEASE, "manual")]
+    ("reaction", "authority"),
+    [(SafetyReaction.LAND, "emergency landing"), (SafetyReaction.RELEASE, "manual")],
 )
-def test_a_lost_transmitter_has_its_reaction(reaction: Reaction, authority: str) -> None:
+def test_a_lost_transmitter_has_its_reaction(reaction: SafetyReaction, authority: str) -> None:
     switch = SwitchSettings(on_rc_loss=reaction)
     flown = fly_watched(rotation, [(0.0, 1500), (13.0, 0)], by="rc", switch=switch, limit_s=40.0)
     assert flown.authority == authority
@@ -196,7 +197,7 @@ def test_a_link_lost_in_a_descent_does_not_end_in_a_hard_touch_down() -> None:
 
 
 def test_a_descent_may_last_until_the_last_command_ends() -> None:
-    fast = Command(1.0, 2.0, -1.5, 3.0)
+    fast = MotionCommand(1.0, 2.0, -1.5, 3.0)
     assert limited_descent(fast, 20.0) == fast
     assert limited_descent(fast, 4.5).up == pytest.approx(-1.0)
     assert limited_descent(fast, 0.2).up == limited_descent(fast, float("nan")).up == -0.8

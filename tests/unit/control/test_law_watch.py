@@ -6,7 +6,7 @@ from math import nan
 
 import pytest
 
-from volery.control.actuation import Command, Measured
+from volery.control.actuation import MeasuredState, MotionCommand
 from volery.control.law_watch import ErrorWatch, FollowWatch, ended_off
 from volery.control.laws import PidGains, PidLaw, Terms
 from volery.control.manoeuvres import LoopSample
@@ -40,7 +40,11 @@ def test_a_step_an_approach_and_a_jump_are_no_growth() -> None:
 
 
 def followed(
-    command: Command, share: float, seconds: float = 12.0, north: float | None = None, climbs: float = 0.0
+    command: MotionCommand,
+    share: float,
+    seconds: float = 12.0,
+    north: float | None = None,
+    climbs: float = 0.0,
 ) -> str:
     """Return what the watch says of a vehicle that does a *share* of what it is commanded.
 
@@ -48,7 +52,7 @@ def followed(
     """
     watch, place = FollowWatch(), [0.0] * 4
     for _ in range(round(seconds / SAMPLE_S)):
-        measured = Measured(
+        measured = MeasuredState(
             place[3] % 360.0, place[0] if north is None else north, *place[1:3], 0.0, 0.0, climbs
         )
         wrong = watch.check(command, measured, SAMPLE_S)
@@ -61,12 +65,12 @@ def followed(
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (Command(north=3.0), "14.9 m north were asked for within 5 s, 0.0 m came"),
-        (Command(up=-0.8), "-2.0 m up were asked for within 2.5 s, 0.0 m came"),
-        (Command(yaw_rate=90.0), "225.0 deg turn were asked for"),
+        (MotionCommand(north=3.0), "14.9 m north were asked for within 5 s, 0.0 m came"),
+        (MotionCommand(up=-0.8), "-2.0 m up were asked for within 2.5 s, 0.0 m came"),
+        (MotionCommand(yaw_rate=90.0), "225.0 deg turn were asked for"),
     ],
 )
-def test_a_command_without_effect_is_told(command: Command, said: str) -> None:
+def test_a_command_without_effect_is_told(command: MotionCommand, said: str) -> None:
     assert said in followed(command, 0.0)
     assert followed(command, 0.5) == ""
     assert followed(command, 0.0, seconds=4.0) == ""
@@ -74,13 +78,13 @@ def test_a_command_without_effect_is_told(command: Command, said: str) -> None:
 
 def test_an_estimate_whose_height_and_climb_disagree_is_not_judged() -> None:
     """A PX4 1.15 in SIH that sank at 0.4 m/s by its velocity was landed, because its height rose."""
-    assert followed(Command(up=-0.45), -0.1, climbs=-0.4) == ""
-    assert "does not follow" in followed(Command(up=-0.45), -0.1, climbs=0.0)
+    assert followed(MotionCommand(up=-0.45), -0.1, climbs=-0.4) == ""
+    assert "does not follow" in followed(MotionCommand(up=-0.45), -0.1, climbs=0.0)
 
 
 def test_small_commands_and_lost_positions_are_not_judged() -> None:
-    assert followed(Command(north=1.0, yaw_rate=5.0), 0.0) == ""
-    assert followed(Command(north=3.0), 0.0, north=nan) == ""
+    assert followed(MotionCommand(north=1.0, yaw_rate=5.0), 0.0) == ""
+    assert followed(MotionCommand(north=3.0), 0.0, north=nan) == ""
 
 
 def test_where_a_manoeuvre_ends_is_judged_by_its_last_errors() -> None:

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from volery.base.errors import UsageError
 from volery.control.safety_switch import (
     Authority,
-    Reaction,
-    Received,
+    KnownInputs,
+    SafetyReaction,
+    SafetyState,
     SwitchSettings,
-    SwitchState,
     decide,
     parse_reaction,
 )
@@ -20,24 +20,24 @@ from volery.control.safety_switch import (
 MANUAL, AUTONOMOUS, LANDING = Authority
 pulses = st.one_of(st.integers(800, 2200), st.sampled_from([0, 65535, 1199, 1200, 1700, 1701]))
 looks = st.builds(
-    Received, pulses, st.sampled_from([0.0, 0.1, 0.99, 1.5, inf]), st.sampled_from([0.0, 0.5, 3.0])
+    KnownInputs, pulses, st.sampled_from([0.0, 0.1, 0.99, 1.5, inf]), st.sampled_from([0.0, 0.5, 3.0])
 )
 settings_of = st.builds(
     SwitchSettings,
-    on_rc_loss=st.sampled_from(Reaction),
-    on_telemetry_loss=st.sampled_from([Reaction.LAND, Reaction.RELEASE]),
+    on_rc_loss=st.sampled_from(SafetyReaction),
+    on_telemetry_loss=st.sampled_from([SafetyReaction.LAND, SafetyReaction.RELEASE]),
 )
 
 
-def at(pulse: int) -> Received:
-    return Received(pulse, 0.05, 0.05)
+def at(pulse: int) -> KnownInputs:
+    return KnownInputs(pulse, 0.05, 0.05)
 
 
 DEFAULT = SwitchSettings()
 
 
-def after(*received: Received, settings: SwitchSettings = DEFAULT) -> SwitchState:
-    state = SwitchState()
+def after(*received: KnownInputs, settings: SwitchSettings = DEFAULT) -> SafetyState:
+    state = SafetyState()
     for one in received:
         state = decide(settings, state, one)
     return state
@@ -56,7 +56,7 @@ def test_one_report_that_is_looked_at_twice_begins_no_landing():
 
 @given(settings_of, st.lists(looks, max_size=40))
 def test_the_program_gets_control_only_by_a_fresh_middle_position(settings, sequence):
-    state = SwitchState()
+    state = SafetyState()
     for one in sequence:
         before, state = state, decide(settings, state, one)
         if state.authority is AUTONOMOUS and before.authority is not AUTONOMOUS:
@@ -67,7 +67,7 @@ def test_the_program_gets_control_only_by_a_fresh_middle_position(settings, sequ
 
 @given(settings_of, st.lists(looks, max_size=40))
 def test_an_emergency_landing_ends_by_a_takeover_only(settings, sequence):
-    state = SwitchState()
+    state = SafetyState()
     for one in sequence:
         before, state = state, decide(settings, state, one)
         if before.authority is LANDING and state.authority is not LANDING:
@@ -94,11 +94,11 @@ def test_the_positions_of_the_thesis():
     ]  # fmt: skip
 
 
-LATE = Received(1500, 1.05, 0.05, new=False)
+LATE = KnownInputs(1500, 1.05, 0.05, new=False)
 
 
 @pytest.mark.parametrize(
-    "bad", [at(1900), at(0), at(65535), at(2201), LATE, Received(1500, 0.05, 2.05, new=False)]
+    "bad", [at(1900), at(0), at(65535), at(2201), LATE, KnownInputs(1500, 0.05, 2.05, new=False)]
 )
 def test_one_wrong_report_does_not_land(bad):
     assert after(at(1500), bad, at(1500)).authority is AUTONOMOUS
@@ -126,19 +126,21 @@ def test_a_switch_held_at_the_border_is_taken_over_once(held):
 
 @pytest.mark.parametrize(
     ("reaction", "expected"),
-    [(Reaction.LAND, LANDING), (Reaction.RELEASE, MANUAL), (Reaction.CONTINUE, AUTONOMOUS)],
+    [(SafetyReaction.LAND, LANDING), (SafetyReaction.RELEASE, MANUAL), (SafetyReaction.CONTINUE, AUTONOMOUS)],
 )
 @pytest.mark.parametrize(
-    "lost", [[Received(1500, 1.5, 0.0, new=False)], [at(0), at(0)], [at(65535), at(2201)]]
+    "lost", [[KnownInputs(1500, 1.5, 0.0, new=False)], [at(0), at(0)], [at(65535), at(2201)]]
 )
 def test_a_lost_transmitter_has_the_configured_reaction(reaction, expected, lost):
     state = after(at(1500), *lost, settings=SwitchSettings(on_rc_loss=reaction))
     assert state.authority is expected
 
 
-@pytest.mark.parametrize(("reaction", "expected"), [(Reaction.LAND, LANDING), (Reaction.RELEASE, MANUAL)])
+@pytest.mark.parametrize(
+    ("reaction", "expected"), [(SafetyReaction.LAND, LANDING), (SafetyReaction.RELEASE, MANUAL)]
+)
 def test_lost_telemetry_has_the_configured_reaction(reaction, expected):
-    state = after(at(1500), Received(1500, 2.5, 2.5), settings=SwitchSettings(on_telemetry_loss=reaction))
+    state = after(at(1500), KnownInputs(1500, 2.5, 2.5), settings=SwitchSettings(on_telemetry_loss=reaction))
     assert state.authority is expected
     assert "telemetry" in state.why
 
@@ -155,7 +157,7 @@ def test_a_switch_that_is_stuck_high_at_the_start_never_flies():
         {"manual_below": 1600},
         {"missing_s": nan},
         {"silent_s": 0.0},
-        {"on_telemetry_loss": Reaction.CONTINUE},
+        {"on_telemetry_loss": SafetyReaction.CONTINUE},
     ],
 )
 def test_wrong_settings_are_refused(wrong):
@@ -164,6 +166,6 @@ def test_wrong_settings_are_refused(wrong):
 
 
 def test_an_unknown_reaction_is_named():
-    assert parse_reaction("release") is Reaction.RELEASE
+    assert parse_reaction("release") is SafetyReaction.RELEASE
     with pytest.raises(UsageError, match="'fly'; there is continue, land or release"):
         parse_reaction("fly")

@@ -9,7 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
-from volery.control.step_response import Idle, Signal, judged, make_signal, step_responses
+from volery.control.step_response import (
+    ControlledSignal,
+    GroundedStretch,
+    judged,
+    make_signal,
+    step_responses,
+)
 
 TIMES = np.arange(0.0, 20.0, 0.01)
 
@@ -17,7 +23,7 @@ TIMES = np.arange(0.0, 20.0, 0.01)
 def one_step(values, goal=1.0, unit="m", period=None, at=2.0):
     """Return a signal that stands at 0 until *at* and then is *values* of the time since."""
     since = np.maximum(TIMES - at, 0.0)
-    return Signal("x", unit, TIMES, values(since), np.where(at <= TIMES, goal, 0.0), period)
+    return ControlledSignal("x", unit, TIMES, values(since), np.where(at <= TIMES, goal, 0.0), period)
 
 
 def response_of(signal, least=None):
@@ -68,7 +74,7 @@ def test_an_angle_takes_the_shorter_way(start, goal):
     size = (goal - start + 180.0) % 360.0 - 180.0
     turned = start + size * (1.0 - np.exp(-np.maximum(TIMES - 2.0, 0.0)))
     goals = np.where(TIMES >= 2.0, goal, start)
-    found = response_of(Signal("yaw", "deg", TIMES, (turned + 180.0) % 360.0 - 180.0, goals, 360.0))
+    found = response_of(ControlledSignal("yaw", "deg", TIMES, (turned + 180.0) % 360.0 - 180.0, goals, 360.0))
     assert found.size == pytest.approx(size, abs=1e-6)
     assert found.settled_10 == pytest.approx(log(10.0), abs=0.02)
 
@@ -76,7 +82,7 @@ def test_an_angle_takes_the_shorter_way(start, goal):
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_half_a_turn_may_take_either_direction(direction):
     turned = direction * 180.0 * (1.0 - np.exp(-np.maximum(TIMES - 2.0, 0.0)))
-    signal = Signal("yaw", "deg", TIMES, turned, np.where(TIMES >= 2.0, 180.0, 0.0), 360.0)
+    signal = ControlledSignal("yaw", "deg", TIMES, turned, np.where(TIMES >= 2.0, 180.0, 0.0), 360.0)
     found = response_of(signal)
     assert found.size == pytest.approx(180.0 * direction)
     assert found.overshoot == pytest.approx(0.0, abs=1e-6)
@@ -96,7 +102,7 @@ def test_a_push_after_settling_is_a_disturbance_not_an_overshoot():
 def test_each_step_has_a_row():
     goal = np.where(TIMES < 5, 0.0, np.where(TIMES < 10, 90.0, np.where(TIMES < 15, -90.0, 45.0)))
     late = np.interp(TIMES - 0.1, TIMES, goal)
-    found = step_responses(Signal("yaw", "deg", TIMES, late, goal, 360.0))
+    found = step_responses(ControlledSignal("yaw", "deg", TIMES, late, goal, 360.0))
     assert [round(one.size) for one in found] == [90, -180, 135]
     assert [one.start for one in found] == pytest.approx([5.0, 10.0, 15.0])
 
@@ -104,7 +110,7 @@ def test_each_step_has_a_row():
 def test_a_ramp_is_judged_from_its_end_and_is_no_step():
     goal = np.clip(TIMES - 5.0, 0.0, 3.0) * 30.0
     late = np.interp(TIMES - 0.2, TIMES, goal)
-    found = response_of(Signal("yaw", "deg", TIMES, late, goal, 360.0))
+    found = response_of(ControlledSignal("yaw", "deg", TIMES, late, goal, 360.0))
     assert (found.start, found.ramp) == pytest.approx((8.0, 3.0), abs=0.1)
     assert found.size == pytest.approx(90.0, abs=0.5)
     assert np.isnan([found.delay, found.rise]).all()
@@ -114,7 +120,7 @@ def test_a_ramp_is_judged_from_its_end_and_is_no_step():
 
 def test_without_set_points_movements_between_rests_are_steps():
     values = 10.0 * (1.0 - np.exp(-np.maximum(TIMES - 4.0, 0.0))) - 4.0 / (1 + np.exp(-(TIMES - 15.0) * 8.0))
-    found = step_responses(Signal("z", "m", TIMES, values), 2.0)
+    found = step_responses(ControlledSignal("z", "m", TIMES, values), 2.0)
     assert [one.size for one in found] == pytest.approx([10.0, -4.0], abs=0.5)
 
 
@@ -136,9 +142,9 @@ def test_disorder_and_gaps_in_a_record_are_mended():
 
 def test_too_few_samples_and_a_wrong_size_are_refused():
     with pytest.raises(UsageError, match="2 samples"):
-        step_responses(Signal("x", "m", TIMES[:2], TIMES[:2]))
+        step_responses(ControlledSignal("x", "m", TIMES[:2], TIMES[:2]))
     with pytest.raises(UsageError, match="above 0"):
-        step_responses(Signal("x", "m", TIMES, TIMES), -1.0)
+        step_responses(ControlledSignal("x", "m", TIMES, TIMES), -1.0)
 
 
 def reasons(signal):
@@ -153,13 +159,15 @@ def following(goal, lag=0.3, **more):
     values = np.zeros_like(goal)
     for index in range(1, len(goal)):
         values[index] = values[index - 1] + (goal[index - 1] - values[index - 1]) * 0.01 / lag
-    return Signal("roll", "deg", TIMES, values, goal, 360.0, **more)
+    return ControlledSignal("roll", "deg", TIMES, values, goal, 360.0, **more)
 
 
 def test_an_oscillation_that_passes_through_the_band_is_not_settled():
     swing = one_step(lambda t: 90.0 + 30.0 * np.sin(1.3 * t) - 90.0 * (t == 0.0), 90.0, "deg")
     for length in range(900, len(TIMES), 37):  # wherever the record ends
-        found = response_of(Signal("x", "deg", TIMES[:length], swing.measured[:length], swing.goal[:length]))
+        found = response_of(
+            ControlledSignal("x", "deg", TIMES[:length], swing.measured[:length], swing.goal[:length])
+        )
         assert np.isnan([found.settled_10, found.settled_3]).all()
 
 
@@ -201,7 +209,7 @@ def test_a_set_point_that_never_stands_is_not_judged():
 
 def test_disarmed_and_landed_stretches_are_not_judged():
     goal = np.where(TIMES < 4.0, 0.0, np.where(TIMES < 10.0, 30.0, np.where(TIMES < 15.0, -30.0, 60.0)))
-    idle = (Idle(-np.inf, 6.0, "disarmed"), Idle(15.5, np.inf, "on the ground"))
+    idle = (GroundedStretch(-np.inf, 6.0, "disarmed"), GroundedStretch(15.5, np.inf, "on the ground"))
     found = judged(following(goal, idle=idle))
     assert [(round(one.start), round(one.end)) for one in found.responses] == [(10, 15)]
     assert [one.why for one in found.not_judged] == [
@@ -212,7 +220,7 @@ def test_disarmed_and_landed_stretches_are_not_judged():
 
 def test_a_response_ends_when_the_vehicle_lands():
     goal = np.where(TIMES < 4.0, 0.0, 30.0)
-    (found,) = step_responses(following(goal, idle=(Idle(12.0, np.inf, "on the ground"),)))
+    (found,) = step_responses(following(goal, idle=(GroundedStretch(12.0, np.inf, "on the ground"),)))
     assert found.end == pytest.approx(12.0)
 
 
@@ -226,7 +234,7 @@ def test_a_gap_in_the_record_is_no_ramp():
     keep = (TIMES < 5.0) | (TIMES > 9.0)
     goal = np.where(TIMES < 7.0, 0.0, 30.0)
     whole = following(goal)
-    assert reasons(Signal("x", "deg", TIMES[keep], whole.measured[keep], goal[keep], 360.0)) == [
+    assert reasons(ControlledSignal("x", "deg", TIMES[keep], whole.measured[keep], goal[keep], 360.0)) == [
         "the record has a gap there"
     ]
 
@@ -238,12 +246,14 @@ def test_a_step_is_dated_when_it_was_sent_or_else_by_its_report_with_the_resolut
     late = make_signal("yaw", "deg", (TIMES, value.measured), (reports, aims), period=360.0)
     (found,) = step_responses(late)
     assert (found.start, found.resolution) == pytest.approx((5.1, 0.25))
-    exact = Signal(**{**vars(late), "sent": [1.0, 5.0, 9.0]})
+    exact = ControlledSignal(**{**vars(late), "sent": [1.0, 5.0, 9.0]})
     (found,) = step_responses(exact)
     assert (found.start, found.resolution) == (5.0, 0.0)
     assert found.settled_10 == pytest.approx(0.5 * log(10.0), abs=0.02)
 
 
 def test_a_jump_without_a_set_point_is_a_step():
-    found = step_responses(Signal("roll", "deg", TIMES, np.where(TIMES < 6.0, 0.0, 10.0), None, 360.0))
+    found = step_responses(
+        ControlledSignal("roll", "deg", TIMES, np.where(TIMES < 6.0, 0.0, 10.0), None, 360.0)
+    )
     assert [(round(one.start), round(one.size)) for one in found] == [(6, 10)]

@@ -22,13 +22,13 @@ from volery.control.teleoperation import (
     Intent,
     Joystick,
     Keyboard,
-    Limits,
     Teleoperator,
+    TeleopLimits,
     teleoperate,
 )
 from volery.run.connect import connect
 
-LIMITS = Limits(speed=2.0, climb=1.0, turn=45.0, change_s=0.5)
+LIMITS = TeleopLimits(speed=2.0, climb=1.0, turn=45.0, change_s=0.5)
 AHEAD = Intent(forward=1.0)
 shares = st.floats(-5.0, 5.0)
 
@@ -128,7 +128,7 @@ def test_a_missing_joystick_and_wrong_limits_are_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="js7"):
         Joystick(tmp_path / "js7")
     with pytest.raises(UsageError, match="speed=0"):
-        Limits(speed=0.0)
+        TeleopLimits(speed=0.0)
 
 
 class Scripted:

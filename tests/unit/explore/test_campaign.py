@@ -11,7 +11,7 @@ from volery.explore import campaign as campaign_module
 from volery.explore import parquet_table
 from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.executors import EngineLostError, open_executor
-from volery.explore.points import Point
+from volery.explore.points import VariantPoint
 from volery.model.builder import ModelBuilder
 
 
@@ -57,7 +57,7 @@ def test_more_seeds_and_values_add_runs(explore):
 
 def test_points_of_a_search_are_made_once_and_returned_in_order(explore):
     campaign = explore(seeds=1)
-    points = [Point({COUNT: 9}, 4), Point({COUNT: 3}, 5), Point({COUNT: 9}, 4)]
+    points = [VariantPoint({COUNT: 9}, 4), VariantPoint({COUNT: 3}, 5), VariantPoint({COUNT: 9}, 4)]
     rows = campaign.evaluate(points)
     assert [row.point for row in rows] == points
     assert [row.run for row in rows] == [2, 3, 2]
@@ -85,7 +85,7 @@ def test_rows_that_could_not_be_compared_are_refused(explore, model, monkeypatch
     with pytest.raises(UsageError, match=what):
         explore()
     with pytest.raises(UsageError, match="could not be compared"):
-        campaign.run([Point({}, 3)])
+        campaign.run([VariantPoint({}, 3)])
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_a_model_that_was_built_in_python_is_carried(tmp_path, model):  # noqa: 
         assert campaign.count() == (3, 3)
         assert campaign.setting.model is built
     with pytest.raises(UsageError, match="was built in Python"):
-        volery.Campaign(tmp_path / "out").evaluate([Point({}, 1)])
+        volery.Campaign(tmp_path / "out").evaluate([VariantPoint({}, 1)])
 
 
 @pytest.mark.parametrize("part", [4, 5, 100])

@@ -13,7 +13,7 @@ from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.campaign_figures import MOST_LINES
 from volery.explore.campaign_page import Findings, write_page
 from volery.explore.campaign_store import CampaignStore
-from volery.explore.points import CRASHED, FAILED, Point, Row
+from volery.explore.points import CRASHED, FAILED, CampaignRow, VariantPoint
 from volery.explore.search import Objective
 from volery.explore.statistics import Interval
 from volery.report.grids import Cell, Column, Grid
@@ -49,9 +49,9 @@ def rows_of(*variants, seeds=10):
     for value, energy, seconds, met in variants:
         for seed in range(seeds):
             observables = {"energy": energy + 0.1 * seed, "time": seconds + 0.1 * seed}
-            point = Point({COUNT: value, "wind": f"{value} m/s"}, seed)
+            point = VariantPoint({COUNT: value, "wind": f"{value} m/s"}, seed)
             found.append(
-                Row(len(found), point, verdicts={"in_time": met}, observables=observables, cpu_s=0.5)
+                CampaignRow(len(found), point, verdicts={"in_time": met}, observables=observables, cpu_s=0.5)
             )
     return found
 
@@ -76,8 +76,8 @@ def test_runs_that_failed_alike_are_one_line_with_an_example(page):
     rows = rows_of((1, 10, 50, True))
     for number in range(3):
         reason = f"drone_1: <b>{20 + number}.5 m</b> off its path"
-        rows.append(Row(len(rows), Point({COUNT: 9}, number), FAILED, reason))
-    rows.append(Row(len(rows), Point({COUNT: 9}, 7), CRASHED, "signal 9"))
+        rows.append(CampaignRow(len(rows), VariantPoint({COUNT: 9}, number), FAILED, reason))
+    rows.append(CampaignRow(len(rows), VariantPoint({COUNT: 9}, 7), CRASHED, "signal 9"))
     drawn = page(rows)
     assert "failed 3 drone_1: &lt;b&gt;20.5 m&lt;/b&gt; off its path 10" in text_of(drawn)
     assert "crashed 1 signal 9 13" in text_of(drawn)
@@ -123,7 +123,9 @@ def test_a_campaign_without_a_finished_run_has_no_page(page):
 def test_of_many_parameters_those_are_drawn_that_matter_beside_the_result(page):
     def row(run):
         values = {f"p{place:02}": (run * (place + 3)) % 17 for place in range(12)}
-        return Row(run, Point(values, run), observables={"energy": 10.0 * values["p11"] - values["p03"]})
+        return CampaignRow(
+            run, VariantPoint(values, run), observables={"energy": 10.0 * values["p11"] - values["p03"]}
+        )
 
     drawn = page([row(run) for run in range(60)])
     assert "the 8 of 12 parameters that go most with energy" in text_of(drawn)
@@ -133,10 +135,11 @@ def test_of_many_parameters_those_are_drawn_that_matter_beside_the_result(page):
 
 
 def test_a_single_run_and_an_infinite_value_are_said_in_words(page):
-    said = text_of(page([Row(0, Point({COUNT: 3}, 1), observables={"time": float("inf")})]))
+    said = text_of(page([CampaignRow(0, VariantPoint({COUNT: 3}, 1), observables={"time": float("inf")})]))
     assert "finished 1 run " in said
     assert "1 variant " in said
     infinite = [
-        Row(n, Point({COUNT: n % 2}, n), observables={"time": [1.0, 2.0, float("inf")][n]}) for n in range(3)
+        CampaignRow(n, VariantPoint({COUNT: n % 2}, n), observables={"time": [1.0, 2.0, float("inf")][n]})
+        for n in range(3)
     ]
     assert "inf" in text_of(page(infinite))

@@ -8,13 +8,17 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.explore.campaign_store import CampaignDiskError, CampaignStore
-from volery.explore.points import Point, Row
+from volery.explore.points import CampaignRow, VariantPoint
 
-POINTS = [Point({"a": "x", "b": 1}, 7), Point({"b": 1, "a": "x"}, 8), Point({"a": "y", "b": 2.5}, 7)]
+POINTS = [
+    VariantPoint({"a": "x", "b": 1}, 7),
+    VariantPoint({"b": 1, "a": "x"}, 8),
+    VariantPoint({"a": "y", "b": 2.5}, 7),
+]
 
 
 def row(run, **changed):
-    return Row(
+    return CampaignRow(
         run,
         POINTS[run],
         **{
@@ -38,7 +42,7 @@ def store(tmp_path):
 
 def test_points_get_numbers_once(store):
     store.ask(POINTS[:2])
-    store.ask([*POINTS, Point({"a": "x", "b": 1}, 7)])
+    store.ask([*POINTS, VariantPoint({"a": "x", "b": 1}, 7)])
     assert store.count() == (3, 0)
     assert [(run, point) for run, _, point in store.unfinished()] == list(enumerate(POINTS))
 

@@ -11,17 +11,17 @@ from pyarrow.parquet import read_table
 from volery.explore import parquet_table
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.parquet_table import write_parquet
-from volery.explore.points import Point, Row
+from volery.explore.points import CampaignRow, VariantPoint
 
 POINTS = [
-    Point({"name": "é, two", "whole": 3, "mixed": 1, "flag": True}, 7),
-    Point({"whole": 4, "mixed": 2.5, "flag": False}, 8),
-    Point({"name": ""}, 9),
+    VariantPoint({"name": "é, two", "whole": 3, "mixed": 1, "flag": True}, 7),
+    VariantPoint({"whole": 4, "mixed": 2.5, "flag": False}, 8),
+    VariantPoint({"name": ""}, 9),
 ]
 ROWS = [
-    Row(0, POINTS[0], "completed", "", {"late": None, "landing": True}, {"energy": 1.5}, host="one"),
-    Row(1, POINTS[1], "failed", "why", {"landing": False}, {}, host="two"),
-    Row(2, POINTS[2], "completed", "", {"late": True}, {"energy": 2.0}, host="one"),
+    CampaignRow(0, POINTS[0], "completed", "", {"late": None, "landing": True}, {"energy": 1.5}, host="one"),
+    CampaignRow(1, POINTS[1], "failed", "why", {"landing": False}, {}, host="two"),
+    CampaignRow(2, POINTS[2], "completed", "", {"late": True}, {"energy": 2.0}, host="one"),
 ]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.base.errors import UsageError
-from volery.explore.points import FAILED, Point, Row
+from volery.explore.points import FAILED, CampaignRow, VariantPoint
 from volery.explore.search import (
     Objective,
     analysis_discards,
@@ -14,9 +14,9 @@ from volery.explore.search import (
     read_objective,
     search,
 )
-from volery.explore.space import Choices, Range
+from volery.explore.space import Choices, RangeParameter
 
-UNIT = {f"x{number}": Range(0.0, 1.0) for number in range(6)}
+UNIT = {f"x{number}": RangeParameter(0.0, 1.0) for number in range(6)}
 BOTH = ("minimise cost", "minimise time")
 
 
@@ -39,9 +39,11 @@ class Bench:
         cost, time = np.array(self.truth(point.values)) * (1.0 + self.noise * random.standard_normal(2))
         # the figures of a run that fails are tempting
         row = (
-            Row(0, point, FAILED, observables={"cost": -1.0, "time": -1.0})
+            CampaignRow(0, point, FAILED, observables={"cost": -1.0, "time": -1.0})
             if self.fails(point.values)
-            else Row(0, point, verdicts={"cheap": cost < 0.5}, observables={"cost": cost, "time": time})
+            else CampaignRow(
+                0, point, verdicts={"cheap": cost < 0.5}, observables={"cost": cost, "time": time}
+            )
         )
         return self.rows.setdefault(point.key, row)
 
@@ -122,7 +124,7 @@ def test_what_noise_hides_is_not_reported_as_a_front():
 SMALL = {
     "x0": Choices([0.1, 0.4, 0.9]),
     "allocation": Choices(["one", "two"]),
-    "n": Range(1, 2, integer=True),
+    "n": RangeParameter(1, 2, integer=True),
 }
 
 
@@ -131,7 +133,7 @@ def mixed(points):
     for one in points:
         v = one.values
         price = v["n"] + (v["allocation"] == "two")
-        rows.append(Row(0, one, observables={"price": price, "time": v["x0"] + 1.0 / price}))
+        rows.append(CampaignRow(0, one, observables={"price": price, "time": v["x0"] + 1.0 / price}))
     return rows
 
 
@@ -215,6 +217,6 @@ def test_analysis_discards_what_overloads_a_computer_and_nothing_that_is_open():
 
 
 def test_the_price_of_the_hardware_is_an_objective():
-    row = Row(0, Point())
+    row = CampaignRow(0, VariantPoint())
     assert hardware_cost("examples/starter", "USD").value(row) > 0.0
     assert np.isnan(hardware_cost("examples/starter", "XAU").value(row))

@@ -7,16 +7,16 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.explore.flight_phases import EVERYWHERE
-from volery.explore.points import FAILED, Row
+from volery.explore.points import FAILED, CampaignRow
 from volery.explore.run_process import read_variant
 from volery.explore.sensitivity import fault_campaign, margin, sensitivity, worst_case
-from volery.explore.space import Choices, Range
+from volery.explore.space import Choices, RangeParameter
 from volery.model.faults import FAULTS
 
 MARGINS = 100
 """Margins whose coverage is counted: with a true one of 90 % the test would fail 19 times in 20."""
 
-SPACE = {name: Range(-pi, pi) for name in ("a", "b", "c")}
+SPACE = {name: RangeParameter(-pi, pi) for name in ("a", "b", "c")}
 FIRST = {"a": 0.3139, "b": 0.4424, "c": 0.0}
 TOTAL = {"a": 0.5576, "b": 0.4424, "c": 0.2437}
 
@@ -25,7 +25,7 @@ def ishigami(points):
     rows = []
     for one in points:
         a, b, c = (one.values[name] for name in SPACE)
-        rows.append(Row(0, one, observables={"y": sin(a) + 7.0 * sin(b) ** 2 + 0.1 * c**4 * sin(a)}))
+        rows.append(CampaignRow(0, one, observables={"y": sin(a) + 7.0 * sin(b) ** 2 + 0.1 * c**4 * sin(a)}))
     return rows
 
 
@@ -43,10 +43,10 @@ def test_morris_finds_what_matters_and_a_failed_run_costs_its_trajectory_only():
     def evaluate(points):
         rows = ishigami(points)
         failed.append(rows[5].point)
-        rows[5] = Row(5, rows[5].point, FAILED, observables={"y": 1e9})
+        rows[5] = CampaignRow(5, rows[5].point, FAILED, observables={"y": 1e9})
         return rows
 
-    found = sensitivity(evaluate, {**SPACE, "d": Range(0, 1)}, "y", size=20)
+    found = sensitivity(evaluate, {**SPACE, "d": RangeParameter(0, 1)}, "y", size=20)
     assert found.runs == 100
     assert found.left_out == 1
     assert found.parameters[-1].parameter == "d"
@@ -60,7 +60,7 @@ def test_morris_finds_what_matters_and_a_failed_run_costs_its_trajectory_only():
         ({"method": "anova"}, "morris or sobol"),
         ({"method": "sobol", "size": 100}, "power of 2"),
         ({"size": 1}, "2 and more"),
-        ({"space": {"a": Range(0, 1)}}, "two parameters"),
+        ({"space": {"a": RangeParameter(0, 1)}}, "two parameters"),
         ({"space": {**SPACE, "d": Choices([1, 2, 3])}}, "no order"),
         ({"quantity": "z"}, "no run observed 'z'"),
     ],
@@ -85,13 +85,15 @@ class Windy:
         for one in points:
             speed = float(one.values["wind"].split()[0])
             drawn = Random(self.root << 32 | one.seed).random()
-            rows.append(Row(0, one, verdicts={"in_time": bool(drawn < self.probability(speed))}))
+            rows.append(CampaignRow(0, one, verdicts={"in_time": bool(drawn < self.probability(speed))}))
         return rows
 
 
 def test_margins_contain_the_limit_as_often_as_they_say():
     truth = 12.0 - np.log(9.0) / 2.0  # met with a probability of 0.9
-    found = [margin(Windy(root), "wind", Range(0.0, 20.0, "m/s"), "in_time") for root in range(MARGINS)]
+    found = [
+        margin(Windy(root), "wind", RangeParameter(0.0, 20.0, "m/s"), "in_time") for root in range(MARGINS)
+    ]
     ends = np.array([[float(end.split()[0]) for end in (one.holds, one.fails)] for one in found])
     assert np.mean((ends[:, 0] <= truth) & (truth <= ends[:, 1])) >= 0.95
     assert np.diff(ends).max() < 5.0
@@ -99,25 +101,25 @@ def test_margins_contain_the_limit_as_often_as_they_say():
 
 
 def test_ends_of_margins():
-    everywhere = margin(Windy(1), "wind", Range(0.0, 5.0, "m/s"), "in_time")
+    everywhere = margin(Windy(1), "wind", RangeParameter(0.0, 5.0, "m/s"), "in_time")
     assert everywhere.fails is None
     assert str(everywhere) == "in_time holds up to 5.0 m/s, the end of the range"
     assert (
-        str(margin(Windy(1), "wind", Range(15.0, 20.0, "m/s"), "in_time"))
+        str(margin(Windy(1), "wind", RangeParameter(15.0, 20.0, "m/s"), "in_time"))
         == "in_time fails at 15.0 m/s already"
     )
-    less = margin(Windy(1), "wind", Range(8.0, 20.0, "m/s"), "in_time", worse="less")
+    less = margin(Windy(1), "wind", RangeParameter(8.0, 20.0, "m/s"), "in_time", worse="less")
     assert less.holds is None
     with pytest.raises(UsageError, match="'late'"):
-        margin(Windy(1), "wind", Range(0.0, 20.0, "m/s"), "late")
+        margin(Windy(1), "wind", RangeParameter(0.0, 20.0, "m/s"), "late")
     with pytest.raises(UsageError, match="greater"):
-        margin(Windy(1), "wind", Range(0.0, 20.0, "m/s"), "in_time", worse="more")
+        margin(Windy(1), "wind", RangeParameter(0.0, 20.0, "m/s"), "in_time", worse="more")
 
 
 def test_a_failed_run_is_the_worst_case():
     def evaluate(points):
         return [
-            Row(0, one, FAILED) if one.values["a"] > 3.1 else row
+            CampaignRow(0, one, FAILED) if one.values["a"] > 3.1 else row
             for one, row in zip(points, ishigami(points), strict=True)
         ]
 
@@ -136,7 +138,9 @@ def test_every_fault_is_tried_in_every_phase():
     def evaluate(points):
         asked.extend(points)
         return [
-            Row(0, one, verdicts={"safe": one.values["environment.faults.campaign"]["kind"] != "wind"})
+            CampaignRow(
+                0, one, verdicts={"safe": one.values["environment.faults.campaign"]["kind"] != "wind"}
+            )
             for one in points
         ]
 
@@ -160,7 +164,7 @@ def test_faults_of_added_sensors_are_tried_on_each_that_can_have_them():
 
     def evaluate(points):
         asked.extend(points)
-        return [Row(0, one, verdicts={"safe": True}) for one in points]
+        return [CampaignRow(0, one, verdicts={"safe": True}) for one in points]
 
     found = fault_campaign(evaluate, system, {"flight": {EVERYWHERE: 20 * S}})
     subjects = {kind: {subject for other, subject in found.table() if other == kind} for kind in FAULTS}

@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from volery.base.errors import UsageError
-from volery.explore.points import FAILED, Point, Row
+from volery.explore.points import FAILED, CampaignRow, VariantPoint
 from volery.explore.statistics import (
     bootstrap,
     compared,
@@ -125,7 +125,7 @@ def test_wrong_conditions_name_the_remedy(text):
 
 def rows_of(values, **verdicts):
     return [
-        Row(number, Point(seed=number), observables={"time": value}, verdicts=verdicts)
+        CampaignRow(number, VariantPoint(seed=number), observables={"time": value}, verdicts=verdicts)
         for number, value in enumerate(values)
     ]
 
@@ -142,7 +142,10 @@ def test_pairs_with_the_same_seed_need_fewer_runs():
 
 def test_runs_that_failed_are_left_out_of_pairs_and_meet_no_requirement():
     rows = rows_of([1.0, 2.0, 3.0, 4.0], fast=True)
-    failed = [*rows[:3], Row(3, Point(seed=3), FAILED, observables={"time": 0.0}, verdicts={"fast": True})]
+    failed = [
+        *rows[:3],
+        CampaignRow(3, VariantPoint(seed=3), FAILED, observables={"time": 0.0}, verdicts={"fast": True}),
+    ]
     assert np.isnan(observed(failed, "time")[3])
     assert compared(rows, failed, "time").left_out == 1
     assert met(failed, "fast").estimate == 0.75

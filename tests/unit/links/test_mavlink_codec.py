@@ -16,7 +16,7 @@ from volery.links.mavlink_codec import (
     frame_length,
     quantised,
 )
-from volery.links.mavlink_messages import MessageType, message_type
+from volery.links.mavlink_messages import MavlinkMessageType, message_type
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
 BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
@@ -147,7 +147,7 @@ def test_a_quantised_frame_is_what_arrives():
     assert third["yaw"] == 0.0
 
 
-def with_extension_fields(kind: MessageType, extra: bytes, flags: int = 0) -> bytes:
+def with_extension_fields(kind: MavlinkMessageType, extra: bytes, flags: int = 0) -> bytes:
     """Return a frame of *kind* as a sender with a newer definition sends it; without its signature."""
     payload = bytes(1 + number % 100 for number in range(kind.size)) + extra
     low, high = kind.id & 0xFFFF, kind.id >> 16

@@ -10,7 +10,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.mavlink_codec import encode
-from volery.links.tlog import Entry, TlogTap, has_links, read_tlog
+from volery.links.tlog import LoggedFrame, TlogTap, has_links, read_tlog
 
 BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
 ARM = Frame("COMMAND_LONG", {"target_system": 1, "command": 400, "param1": 1.0}, 255, 190)
@@ -65,12 +65,12 @@ def test_the_two_lowest_bits_of_our_stamps_are_the_link(tmp_path: Path) -> None:
 
 
 def test_links_are_told_from_microseconds_by_the_sequence_of_the_frames() -> None:
-    def entries(links: int) -> list[Entry]:
-        found = [Entry(4 * number, BEAT, number % 256) for number in range(300)]
+    def entries(links: int) -> list[LoggedFrame]:
+        found = [LoggedFrame(4 * number, BEAT, number % 256) for number in range(300)]
         if links == 2:
-            found += [Entry(4 * (number + 40) + 1, BEAT, number % 256) for number in range(300)]
+            found += [LoggedFrame(4 * (number + 40) + 1, BEAT, number % 256) for number in range(300)]
         return sorted(found, key=lambda one: one.at_us)
 
     assert has_links(entries(2))
     assert not has_links(entries(1))
-    assert not has_links([Entry(number * 12345, BEAT, number % 256) for number in range(300)])
+    assert not has_links([LoggedFrame(number * 12345, BEAT, number % 256) for number in range(300)])

@@ -6,7 +6,7 @@ import pytest
 
 from volery.base.errors import ModelError
 from volery.base.time import S
-from volery.model.added_sensors import Camera, Lidar, Odometry
+from volery.model.added_sensors import CameraSpec, LidarSpec, Odometry
 from volery.model.faults import SensorClockOff
 
 ROVER = "sensors: rtk, started: cold"
@@ -21,7 +21,7 @@ def sensors_of(workshop, written):
 @pytest.mark.parametrize("written", ["lidar", "[lidar]", "{lidar: {}}", "[{lidar: }]"])
 def test_a_kind_alone_has_the_usual_settings(workshop, written):
     (lidar,) = sensors_of(workshop, written)
-    assert lidar == Lidar()
+    assert lidar == LidarSpec()
     assert (lidar.named, lidar.topic("scan")) == ("lidar", "scan")
 
 
@@ -46,7 +46,7 @@ def test_a_camera_has_its_lens_and_its_place(workshop):
     (camera,) = sensors_of(
         workshop, "[{camera: {pitch: 90 deg, distortion: [-0.2, 0.05], latency: 20 ms, at: [0, 0, -5 cm]}}]"
     )
-    made = Camera(pitch_deg=90.0, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0), at=(0.0, 0.0, -0.05))
+    made = CameraSpec(pitch_deg=90.0, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0), at=(0.0, 0.0, -0.05))
     assert camera == replace(made, latency_ns=20_000_000)
 
 

@@ -57,8 +57,8 @@ def test_every_property_has_a_description():
 def test_defaults_are_written_as_a_model_writes_them():
     run = schema()["$defs"]["RunLimits"]["properties"]["duration"]
     assert (run["default"], run["x-unit"]) == ("900 s", "s")
-    assert schema()["$defs"]["Processor"]["properties"]["scheduler"]["enum"][0] == "fixed-priority"
+    assert schema()["$defs"]["ProcessorSpec"]["properties"]["scheduler"]["enum"][0] == "fixed-priority"
 
 
 def test_a_figure_may_take_its_reference_from_its_component():
-    assert schema()["$defs"]["Figure"]["required"] == ["time"]
+    assert schema()["$defs"]["StatedFigure"]["required"] == ["time"]

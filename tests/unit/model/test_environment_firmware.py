@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import ModelError
-from volery.model.environment import Firmware
+from volery.model.environment import FirmwareProgram
 
 STATED = "autopilot: ardupilot"
 
@@ -24,7 +24,7 @@ def test_a_name_alone_is_a_simulated_autopilot(workshop):
 
 def test_a_name_without_a_slash_is_kept(workshop):
     vehicle = vehicle_with(workshop, "autopilot: {is: ardupilot, firmware: arducopter}")
-    assert (vehicle.autopilot, vehicle.firmware) == ("ardupilot", Firmware("arducopter"))
+    assert (vehicle.autopilot, vehicle.firmware) == ("ardupilot", FirmwareProgram("arducopter"))
 
 
 def test_paths_are_relative_to_the_model(workshop):
@@ -33,14 +33,14 @@ def test_paths_are_relative_to_the_model(workshop):
         workshop,
         "autopilot: {is: ardupilot, firmware: bin/copter, parameters: slow.parm, repeatable: true}",
     )
-    assert vehicle.firmware == Firmware(
+    assert vehicle.firmware == FirmwareProgram(
         str(workshop.folder / "bin/copter"), (workshop.folder / "slow.parm",), repeatable=True
     )
 
 
 def test_an_option_puts_a_vehicle_on_real_firmware(workshop):
     vehicle = vehicle_with(workshop, STATED, "environment.vehicles.drone_1.autopilot.firmware=/opt/copter")
-    assert (vehicle.autopilot, vehicle.firmware) == ("ardupilot", Firmware("/opt/copter"))
+    assert (vehicle.autopilot, vehicle.firmware) == ("ardupilot", FirmwareProgram("/opt/copter"))
 
 
 @pytest.mark.parametrize(

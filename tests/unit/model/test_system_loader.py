@@ -8,9 +8,9 @@ import pytest
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import MS, S
-from volery.model.components import Activity, Figure, Reference
+from volery.model.components import Activity, StatedAt, StatedFigure
 from volery.model.faults import MotorDead
-from volery.model.instances import Connection, Target, TargetKind
+from volery.model.instances import ConnectionTarget, PortConnection, TargetKind
 from volery.model.reading import ProcessorKind
 from volery.model.system import Chain
 from volery.model.system_loader import load
@@ -62,10 +62,12 @@ def test_a_chain_of_topics_can_be_observed(workshop):
 def test_ports_are_connected(workshop):
     system = workshop.load()
     drones = system.instance("central").connections["drones"]
-    assert drones == Connection(
-        "drones", "DroneService", (Target(TargetKind.INSTANCE, "control", "service"),), many=True
+    assert drones == PortConnection(
+        "drones", "DroneService", (ConnectionTarget(TargetKind.INSTANCE, "control", "service"),), many=True
     )
-    assert system.instance("control").connections["drone"].targets == (Target(TargetKind.VEHICLE, "drone_1"),)
+    assert system.instance("control").connections["drone"].targets == (
+        ConnectionTarget(TargetKind.VEHICLE, "drone_1"),
+    )
     assert str(system.instance("planner").connections["map"].targets[0]) == "environment"
     assert "progress" not in system.instance("control").connections
 
@@ -95,7 +97,7 @@ def test_figures_stand_at_a_processor(workshop):
         (1 * MS, "intel-i5-3470"),
     ]
     order = workshop.load().components["DeliveryCentral"].operations["order"][0]
-    assert order == Figure(2 * MS, Reference("intel-i5-3470", 3e9), 0.003, "estimated")
+    assert order == StatedFigure(2 * MS, StatedAt("intel-i5-3470", 3e9), 0.003, "estimated")
 
 
 def test_the_class_is_the_components_name_in_camel_case(workshop):

@@ -13,9 +13,9 @@ from volery.model import rules
 from volery.model import text as model_text
 from volery.model.text import (
     CollectedModelError,
-    Node,
     Problems,
     Quoted,
+    TextNode,
     is_inside,
     no_such,
     outside,
@@ -39,7 +39,7 @@ deep:
 
 
 @pytest.fixture
-def tree() -> Node:
+def tree() -> TextNode:
     return parse(TEXT, "m.yaml")
 
 
@@ -53,7 +53,7 @@ def problems_at(lines: dict[tuple[str | int, ...], int]) -> Problems:
     return Problems(lambda path: Location("m.yaml", lines[path]) if path in lines else None)
 
 
-def test_values_have_the_types_of_yaml_1_2(tree: Node) -> None:
+def test_values_have_the_types_of_yaml_1_2(tree: TextNode) -> None:
     assert tree.plain() == {
         "name": "five",
         "list": ["one", {"two": "2", "three": 3}],
@@ -63,7 +63,7 @@ def test_values_have_the_types_of_yaml_1_2(tree: Node) -> None:
     assert parse("a: yes", "m").plain() == {"a": "yes"}
 
 
-def test_a_text_in_quotation_marks_stays_one(tree: Node) -> None:
+def test_a_text_in_quotation_marks_stays_one(tree: TextNode) -> None:
     plain = tree.plain()
     assert isinstance(plain["list"][1]["two"], Quoted)
     assert isinstance(plain["flow"][4], Quoted)
@@ -72,7 +72,7 @@ def test_a_text_in_quotation_marks_stays_one(tree: Node) -> None:
     assert isinstance(tree.moved(Location("x", 9)).plain()["flow"][4], Quoted)
 
 
-def test_an_entry_stands_in_the_line_of_its_key_and_an_item_in_its_own(tree: Node) -> None:
+def test_an_entry_stands_in_the_line_of_its_key_and_an_item_in_its_own(tree: TextNode) -> None:
     lines = {
         (): 1,
         ("name",): 1,
@@ -90,7 +90,7 @@ def test_an_entry_stands_in_the_line_of_its_key_and_an_item_in_its_own(tree: Nod
     }
 
 
-def test_a_path_that_does_not_exist_is_located_at_its_deepest_part_that_does(tree: Node) -> None:
+def test_a_path_that_does_not_exist_is_located_at_its_deepest_part_that_does(tree: TextNode) -> None:
     assert tree.locate(("deep", "er", "nothing", "here")) == Location("m.yaml", 8)
     assert tree.at(("deep", "er", "nothing", "here")) is None
     found = tree.at(("deep", "er", "est"))
@@ -98,7 +98,7 @@ def test_a_path_that_does_not_exist_is_located_at_its_deepest_part_that_does(tre
     assert found.value == "end"
 
 
-def test_items_are_found_by_number_and_by_its_text_up_to_the_last(tree: Node) -> None:
+def test_items_are_found_by_number_and_by_its_text_up_to_the_last(tree: TextNode) -> None:
     listed = tree.child("list")
     assert listed is not None
     first, last = listed.child("0"), listed.child(1)
@@ -111,7 +111,7 @@ def test_items_are_found_by_number_and_by_its_text_up_to_the_last(tree: Node) ->
     assert listed.items == {}
 
 
-def test_a_copy_is_deep_and_keeps_lines_and_a_moved_one_has_new_ones(tree: Node) -> None:
+def test_a_copy_is_deep_and_keeps_lines_and_a_moved_one_has_new_ones(tree: TextNode) -> None:
     copy = tree.copy()
     moved = tree.moved(Location("other.yaml", 77))
     tree.items["deep"].items["er"].items.clear()
@@ -122,7 +122,7 @@ def test_a_copy_is_deep_and_keeps_lines_and_a_moved_one_has_new_ones(tree: Node)
         assert moved.locate(below) == Location("other.yaml", 77)
 
 
-def test_texts_of_a_key_are_one_or_a_list_of_them(tree: Node) -> None:
+def test_texts_of_a_key_are_one_or_a_list_of_them(tree: TextNode) -> None:
     assert stated_texts(tree, "name") == ["five"]
     assert stated_texts(tree, "flow") == ["a", "no"]
     assert stated_texts(tree, "deep") == []
@@ -156,7 +156,7 @@ def test_texts_of_a_key_are_one_or_a_list_of_them(tree: Node) -> None:
         ),
     ],
 )
-def test_what_is_no_model(text: str, line: int, path: str, says: str, code: rules.Rule) -> None:
+def test_what_is_no_model(text: str, line: int, path: str, says: str, code: rules.ModelRule) -> None:
     error = refusal(text)
     assert says in error.what
     assert (error.where, error.path, error.code) == (Location("m.yaml", line), path, code.code)
@@ -185,7 +185,7 @@ def test_brackets_of_a_type_within_braces_have_a_hint() -> None:
 
 def test_an_options_value_stands_where_the_option_is() -> None:
     where = Location("--set a=b", 0)
-    assert parse_value("  ", where) == Node(None, where)
+    assert parse_value("  ", where) == TextNode(None, where)
     value = parse_value("{x: [1, 2]}", where)
     assert value.plain() == {"x": [1, 2]}
     assert value.locate(("x", 1)) == where

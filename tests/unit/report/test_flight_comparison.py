@@ -16,19 +16,19 @@ from volery.report.flight_comparison import (
     phase_grid,
     phases,
 )
-from volery.report.flights import Answer, Curve, Flight, State, read_flights
+from volery.report.flights import Curve, FlightAnswer, State, VehicleFlight, read_flights
 
 ASKED = (("takeoff", 1.0, 13.0), ("goto", 20.0, 30.0), ("land", 35.0, 50.0))
 USUAL = Shape()
 SLOW = (("takeoff", 1.0, 18.0), ("goto", 20.0, 30.0), ("land", 35.0, 50.0))
 
 
-def flown(path: Path, shape: Shape = USUAL, operations=ASKED) -> Flight:
+def flown(path: Path, shape: Shape = USUAL, operations=ASKED) -> VehicleFlight:
     (found,) = read_flights(write_run(path, shape, operations))
     return found
 
 
-def compared(first: Flight, second: Flight, within_m: float = 2.0) -> FlightComparison:
+def compared(first: VehicleFlight, second: VehicleFlight, within_m: float = 2.0) -> FlightComparison:
     return compare_flights(first, second, ("one", "other"), within_m)
 
 
@@ -80,7 +80,7 @@ def test_another_way_in_the_same_time(tmp_path: Path) -> None:
     assert phase(compared(*two(tmp_path), within_m=16.0), "goto").alike
 
 
-def two(folder: Path) -> tuple[Flight, Flight]:
+def two(folder: Path) -> tuple[VehicleFlight, VehicleFlight]:
     return read_flights(folder / "run")[0], read_flights(folder / "east")[0]
 
 
@@ -152,9 +152,12 @@ def test_what_was_asked_the_same_is_matched_before_the_name_alone(tmp_path: Path
 def test_answers_stand_beside_each_other_in_order(tmp_path: Path) -> None:
     flight = flown(tmp_path / "run")
     first = replace(
-        flight, answers=(Answer(1, "arm", "ok"), Answer(2, "goto", "ok"), Answer(3, "goto", "ok"))
+        flight,
+        answers=(FlightAnswer(1, "arm", "ok"), FlightAnswer(2, "goto", "ok"), FlightAnswer(3, "goto", "ok")),
     )
-    second = replace(flight, answers=(Answer(1, "arm", "Refused", "no GPS"), Answer(2, "land", "ok")))
+    second = replace(
+        flight, answers=(FlightAnswer(1, "arm", "Refused", "no GPS"), FlightAnswer(2, "land", "ok"))
+    )
     assert [tuple(row) for row in compared(first, second).answers] == [
         ("arm", "ok", "Refused: no GPS"),
         ("goto", "ok ×2", None),

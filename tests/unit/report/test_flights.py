@@ -12,7 +12,7 @@ from rigs.flown_records import SAID, Shape, write_dataflash, write_run, write_tl
 from volery.base.errors import UsageError
 from volery.links.frame import Frame
 from volery.report.flight_comparison import phases
-from volery.report.flights import BATTERY, PITCH, ROLL, SPEED, YAW, Flight, read_flights
+from volery.report.flights import BATTERY, PITCH, ROLL, SPEED, YAW, VehicleFlight, read_flights
 
 WRITERS = {
     "run": lambda folder, shape: write_run(folder / "run", shape),
@@ -24,22 +24,22 @@ LOGS = [name for name in WRITERS if name != "run"]
 
 
 @pytest.fixture(params=WRITERS)
-def flight(request: pytest.FixtureRequest, tmp_path: Path) -> Flight:
+def flight(request: pytest.FixtureRequest, tmp_path: Path) -> VehicleFlight:
     (found,) = read_flights(WRITERS[request.param](tmp_path, Shape(east_m=8.0)))
     return found
 
 
-def value(flight: Flight, name: str, time: float) -> float:
+def value(flight: VehicleFlight, name: str, time: float) -> float:
     return float(flight.values(name, np.array([time]))[0])
 
 
-def test_the_track_is_about_the_place_of_arming(flight: Flight) -> None:
+def test_the_track_is_about_the_place_of_arming(flight: VehicleFlight) -> None:
     tolerance = 0.02  # a tlog has centimetres
     for time, place in ((5.0, (0, 0, 0)), (10.0, (0, 0, 4)), (25.0, (4, 10, 10)), (40.0, (8, 20, 5))):
         assert flight.places(np.array([time]))[0] == pytest.approx(place, abs=tolerance)
 
 
-def test_attitude_speed_and_battery_have_the_same_signs_and_units(flight: Flight) -> None:
+def test_attitude_speed_and_battery_have_the_same_signs_and_units(flight: VehicleFlight) -> None:
     assert value(flight, ROLL, 25.0) == pytest.approx(0.0, abs=0.01)
     assert value(flight, PITCH, 25.0) == pytest.approx(-5.0, abs=0.01)  # nose down
     assert value(flight, YAW, 25.0) == pytest.approx(45.0, abs=0.01)
@@ -48,7 +48,7 @@ def test_attitude_speed_and_battery_have_the_same_signs_and_units(flight: Flight
     assert value(flight, BATTERY, 40.0) == pytest.approx(80.0, abs=0.5)
 
 
-def test_phases_by_states(flight: Flight) -> None:
+def test_phases_by_states(flight: VehicleFlight) -> None:
     found = {one.name: one.stretch for one in phases(flight, by_operations=False)}
     modes = [name for name in found if name.startswith("mode ")]
     assert modes in (["mode GUIDED", "mode LAND"], ["mode AUTO.LOITER", "mode AUTO.LAND"])
@@ -58,7 +58,7 @@ def test_phases_by_states(flight: Flight) -> None:
     assert found["landing"] == pytest.approx((35.0, 45.0), abs=0.6)
 
 
-def test_what_was_said(flight: Flight) -> None:
+def test_what_was_said(flight: VehicleFlight) -> None:
     (said,) = (one for one in flight.texts if SAID in one.text)
     assert said.time == pytest.approx(2.0, abs=0.01)
     assert not said.text.endswith("\t")

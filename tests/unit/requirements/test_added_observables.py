@@ -12,7 +12,7 @@ from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.report.html_report import recover
 from volery.requirements.accounts import Accounts
-from volery.requirements.added_observables import AddedObservables, Quantity, added_observables
+from volery.requirements.added_observables import AddedObservables, ObservedQuantity, added_observables
 from volery.requirements.observables import all_observables, make_observer
 from volery.requirements.record import TableRecord
 from volery.run.result import Options
@@ -150,7 +150,7 @@ def test_vehicles_are_apart_while_both_are_in_the_air(separation_package):
 
 
 class Counting(AddedObservables):
-    quantities = (Quantity("troubles", "", "failures, counted"),)
+    quantities = (ObservedQuantity("troubles", "", "failures, counted"),)
     listens = (Failure,)
 
     def __init__(self, setup):
@@ -188,9 +188,12 @@ def test_what_a_package_raises_ends_it_and_not_the_run(added):
     ("wrong", "complaint"),
     [
         ({"subject": "planet"}, "its subject is 'planet'; there is application"),
-        ({"quantities": (Quantity("a", "furlong", ""),)}, "the unit of a: there is no unit 'furlong'"),
         (
-            {"quantities": (Quantity("delivered", "", ""),)},
+            {"quantities": (ObservedQuantity("a", "furlong", ""),)},
+            "the unit of a: there is no unit 'furlong'",
+        ),
+        (
+            {"quantities": (ObservedQuantity("delivered", "", ""),)},
             "those of 'volery' both define the quantity 'deliver",
         ),
     ],

@@ -10,7 +10,7 @@ from volery.base.time import MS, S
 from volery.requirements.ledgers import (
     ChainLedger,
     ComponentLedger,
-    Distribution,
+    DurationStatistics,
     VehicleLedger,
     known,
     largest,
@@ -20,8 +20,8 @@ from volery.trace.attachments import ChainSetup, ComponentSetup, ProcessorSetup,
 from volery.trace.events import NONE, Activation, Call, Charge, Message, Operation, VehicleState
 
 
-def spread(durations: list[int]) -> Distribution:
-    found = Distribution()
+def spread(durations: list[int]) -> DurationStatistics:
+    found = DurationStatistics()
     for duration in durations:
         found.add(duration)
     return found

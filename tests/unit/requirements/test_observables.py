@@ -8,7 +8,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.base.units import unit
-from volery.model.system import Bound
+from volery.model.system import RequiredBound
 from volery.requirements.observables import OBSERVABLES, make_observer
 from volery.requirements.verdicts import Observers, bounds_of, judge
 from volery.run.result import Options
@@ -376,8 +376,8 @@ def test_an_unknown_quantity_is_refused_with_the_choices():
 def test_verdicts():
     bounds = (
         *bounds_of(SETUP),
-        Bound("fast", "loop.response_time", "max", 0.02),
-        Bound("many", "loop.activations", "min", 2),
+        RequiredBound("fast", "loop.response_time", "max", 0.02),
+        RequiredBound("many", "loop.activations", "min", 2),
     )
     watching = Observers(bounds, SETUP)
     for event in activations((0, 10), (100, 130), deadline=50):
@@ -391,8 +391,8 @@ def test_verdicts():
 
 
 def test_what_could_not_be_observed_is_not_met():
-    assert not judge(Bound("r", "x.y", "max", 1.0), nan, 0).met
-    assert not judge(Bound("r", "x.y", "min", 1.0), nan, 0).met
+    assert not judge(RequiredBound("r", "x.y", "max", 1.0), nan, 0).met
+    assert not judge(RequiredBound("r", "x.y", "min", 1.0), nan, 0).met
 
 
 def test_the_landing_at_the_end_of_a_run_is_no_landing_and_no_failure_of_the_vehicle():

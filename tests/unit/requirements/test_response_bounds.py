@@ -12,14 +12,14 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Rate, current_task, end_activation
-from volery.requirements.response_bounds import Demand, Demands, Load, response_bounds
+from volery.requirements.response_bounds import BackgroundLoad, Demands, TaskDemand, response_bounds
 from volery.trace.attachments import ComponentSetup, ProcessorSetup
 from volery.trace.events import NONE, Activation, Slice
 
 
 def bounds(*tasks, loads=(), cores=1):
     demands = [
-        Demand.periodic(name, priority, cost * MS, period * MS) for name, priority, cost, period in tasks
+        TaskDemand.periodic(name, priority, cost * MS, period * MS) for name, priority, cost, period in tasks
     ]
     found = response_bounds(demands, loads, cores)
     return {name: None if bound is None else bound / MS for name, bound in found.items()}
@@ -39,8 +39,8 @@ def test_what_does_not_fit_has_no_bound():
 
 
 def test_other_computing_counts_as_more_urgent():
-    assert bounds(("a", 1, 10, 100), loads=[Load(5 * MS)]) == {"a": 35}
-    assert bounds(("a", 1, 10, 100), loads=[Load(10 * MS)]) == {"a": None}
+    assert bounds(("a", 1, 10, 100), loads=[BackgroundLoad(5 * MS)]) == {"a": 35}
+    assert bounds(("a", 1, 10, 100), loads=[BackgroundLoad(10 * MS)]) == {"a": None}
 
 
 def test_two_cores_bear_two_tasks():
@@ -150,7 +150,7 @@ def test_one_long_start_does_not_count_for_every_activation():
 
 def test_a_burst_waits_for_itself():
     """Three releases at once, each of 2 ms, every 20 ms: the last of them waits for the two before."""
-    demand = Demand("a", 0, (2 * MS,), (0, 0, 20 * MS), 0)
+    demand = TaskDemand("a", 0, (2 * MS,), (0, 0, 20 * MS), 0)
     assert response_bounds([demand], [], 1) == {"a": 6 * MS}
     assert [demand.released_within(one * MS) for one in (0, 1, 20, 21)] == [0, 3, 3, 6]
 

@@ -10,7 +10,7 @@ import pytest
 
 from volery.base.errors import CapabilityError, NotArrived, OffTrack, UsageError
 from volery.control.log_signals import read_signals
-from volery.control.manoeuvres import Altitude, Manoeuvre, Rotation, Waypoints
+from volery.control.manoeuvres import Altitude, LawManoeuvre, Rotation, Waypoints
 from volery.control.safety_switch import SwitchSettings
 from volery.control.step_response import StepResponse
 from volery.run.go import GoSettings, go, with_rates
@@ -47,7 +47,7 @@ STEERED = {
     "paparazzi": ("setpoints",),
 }
 """Simulated autopilots and their ways of steering."""
-MANOEUVRES: dict[str, Callable[[], Manoeuvre]] = {
+MANOEUVRES: dict[str, Callable[[], LawManoeuvre]] = {
     "altitude": lambda: Altitude([9.0, 6.0], 8.0),
     "rotation": lambda: Rotation([90.0, 0.0], 8.0),
     "waypoints": lambda: Waypoints([(6.0, 0.0, 5.0), (6.0, 6.0, 7.0)]),

@@ -20,7 +20,7 @@ from volery.requirements.record import read_record
 from volery.run import process_session
 from volery.run.process_session import _Outbox
 from volery.trace.events import Milestone, Published, VehicleState
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
@@ -190,7 +190,7 @@ def test_a_component_that_kills_the_process_fails_the_run_and_nothing_else(model
     assert session.now >= 400 * S
     assert run.record.sim_s >= 400.0
     assert read_record(tmp_path / "run").outcome == run.record.outcome
-    with Reading(tmp_path / "run" / "trace.mcap") as reading:
+    with OpenTrace(tmp_path / "run" / "trace.mcap") as reading:
         assert any(isinstance(event, Milestone) for event in reading.events())
 
 

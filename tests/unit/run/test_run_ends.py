@@ -10,7 +10,7 @@ from volery.run.fly import fly
 from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Operation
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_the_landing_at_the_end_of_a_failed_run_is_not_judged(failed):
 
 
 def test_it_is_recorded_as_what_it_is(failed):
-    with Reading(failed.folder / "trace.mcap") as reading:
+    with OpenTrace(failed.folder / "trace.mcap") as reading:
         done = [event for event in reading.events() if isinstance(event, Operation)]
     assert done[-1].operation == "come_to_rest"
     assert (done[-1].asked, done[-1].outcome) == ("land", "ok")

@@ -28,7 +28,7 @@ from volery.trace.attachments import (
 )
 from volery.trace.events import Event, Failure, Published, Slice, Text
 from volery.trace.mcap_writer import Attachment, McapWriter
-from volery.trace.reader import Reading, read
+from volery.trace.reader import OpenTrace, read
 
 _MAP = Attachment("world.json", "application/json", to_json(sample_scenery()))
 
@@ -116,7 +116,7 @@ def test_one_may_read_some_kinds_only(tmp_path: Path) -> None:
     path = tmp_path / "trace.mcap"
     events = write_sample(path)
     for kinds in ({Text, Slice}, {Published}, set()):
-        with Reading(path) as reading:
+        with OpenTrace(path) as reading:
             found = list(reading.events(kinds))
         assert found == [event for event in events if type(event) in kinds]
         assert reading.complete
@@ -314,7 +314,7 @@ def test_a_full_disk_leaves_a_readable_trace_and_a_problem(tmp_path: Path) -> No
     trace = read(path)
     assert trace.events
     assert not trace.complete
-    with Reading(path) as reading:
+    with OpenTrace(path) as reading:
         assert reading.setup == sample_setup()
 
 
@@ -376,7 +376,7 @@ def test_a_trace_is_complete_only_with_its_end_and_its_last_bytes(tmp_path: Path
 def test_the_file_is_closed_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "trace.mcap"
     write_sample(path, seconds=1.0)
-    with Reading(path) as reading:
+    with OpenTrace(path) as reading:
         list(reading.events())
         assert not reading._file.closed
     assert reading._file.closed

@@ -16,7 +16,7 @@ from volery.trace.events import Operation, Text
 from volery.vehicles import Drone, Limits, Velocity
 from volery.vehicles.address import parse
 from volery.vehicles.limits import Bounds
-from volery.vehicles.monitors import Demand, FollowMonitor, ThrustMonitor, TrackMonitor
+from volery.vehicles.monitors import FollowMonitor, StreamedSetpoint, ThrustMonitor, TrackMonitor
 from volery.vehicles.telemetry import Attitude, Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
@@ -210,7 +210,7 @@ class Streamed(Reported):
 
     def asked(
         self,
-        demand: Demand,
+        demand: StreamedSetpoint,
         *,
         seconds: float = 6.0,
         moves: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -231,25 +231,31 @@ class Streamed(Reported):
         return None
 
 
-NORTH = Demand(velocity=(2.0, 0.0, 0.0), yaw_rate=0.0)
-NOSE_DOWN = Demand(roll=0.0, pitch=-10.0, yaw_rate=0.0, thrust=0.5)
+NORTH = StreamedSetpoint(velocity=(2.0, 0.0, 0.0), yaw_rate=0.0)
+NOSE_DOWN = StreamedSetpoint(roll=0.0, pitch=-10.0, yaw_rate=0.0, thrust=0.5)
 
 
 @pytest.mark.parametrize(
     ("demand", "said"),
     [
         (NORTH, r"in 3 s [56]\.\d m were asked for and 0\.0 m came"),
-        (Demand(acceleration=(0.0, 1.0, 0.0), yaw_rate=0.0), r"[67]\.\d m were asked for and 0\.0 m came"),
+        (
+            StreamedSetpoint(acceleration=(0.0, 1.0, 0.0), yaw_rate=0.0),
+            r"[67]\.\d m were asked for and 0\.0 m came",
+        ),
         (NOSE_DOWN, r"a lean of (9|10)\.\d degrees was asked for and 0\.0 came"),
         (
-            Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0),
+            StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0),
             r"a turn of \d+ degrees was asked for and 0\.0 came",
         ),
-        (Demand(roll=0.0, pitch=0.0, heading=90.0, thrust=0.5), "a turn of 90 degrees was asked for"),
-        (Demand(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.9), "a climb by thrust was asked for"),
+        (
+            StreamedSetpoint(roll=0.0, pitch=0.0, heading=90.0, thrust=0.5),
+            "a turn of 90 degrees was asked for",
+        ),
+        (StreamedSetpoint(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.9), "a climb by thrust was asked for"),
     ],
 )
-def test_a_vehicle_that_does_nothing_of_what_is_streamed(demand: Demand, said: str) -> None:
+def test_a_vehicle_that_does_nothing_of_what_is_streamed(demand: StreamedSetpoint, said: str) -> None:
     streamed = Streamed()
     with pytest.raises(VehicleError, match=f"it does not follow its set-points: .*{said}"):
         raise streamed.asked(demand) or AssertionError("nothing was found")
@@ -261,15 +267,18 @@ def test_a_vehicle_that_does_nothing_of_what_is_streamed(demand: Demand, said: s
     [
         (NORTH, {"moves": (0.4, 0.0, 0.0)}),  # far too slow, but it follows
         (NOSE_DOWN, {"leans": (0.0, -4.0)}),
-        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), {"turns": 20.0}),
-        (Demand(roll=0.0, pitch=0.0, heading=270.0, thrust=0.5), {"turns": -20.0, "seconds": 4.0}),
-        (Demand(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.1), {"moves": (0.0, 0.0, -0.5)}),
-        (Demand(velocity=(0.3, 0.0, 0.0), yaw_rate=0.0), {}),  # as a law that holds a place against wind
-        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=0.0), {}),
-        (Demand(velocity=(2.0, 0.0, 0.0), yaw_rate=20.0), {"turns": 20.0}),  # in part
+        (StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), {"turns": 20.0}),
+        (StreamedSetpoint(roll=0.0, pitch=0.0, heading=270.0, thrust=0.5), {"turns": -20.0, "seconds": 4.0}),
+        (StreamedSetpoint(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.1), {"moves": (0.0, 0.0, -0.5)}),
+        (
+            StreamedSetpoint(velocity=(0.3, 0.0, 0.0), yaw_rate=0.0),
+            {},
+        ),  # as a law that holds a place against wind
+        (StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=0.0), {}),
+        (StreamedSetpoint(velocity=(2.0, 0.0, 0.0), yaw_rate=20.0), {"turns": 20.0}),  # in part
     ],
 )
-def test_a_vehicle_that_follows_at_least_in_part(demand: Demand, did: dict[str, Any]) -> None:
+def test_a_vehicle_that_follows_at_least_in_part(demand: StreamedSetpoint, did: dict[str, Any]) -> None:
     assert Streamed().asked(demand, **{"seconds": 12.0, **did}) is None
 
 
@@ -278,11 +287,11 @@ def test_a_vehicle_that_follows_at_least_in_part(demand: Demand, did: dict[str, 
     [
         (NORTH, (0.6, 0.0, 0.0), 0.0),  # to and fro, as in front of a fence
         (NORTH, (0.0, 0.6, 0.0), 0.0),  # across
-        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), (0.0, 0.0, 0.0), 8.0),  # a noisy heading
+        (StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), (0.0, 0.0, 0.0), 8.0),  # a noisy heading
     ],
 )
 def test_motion_to_and_fro_leads_nowhere(
-    demand: Demand, moves: tuple[float, float, float], turns: float
+    demand: StreamedSetpoint, moves: tuple[float, float, float], turns: float
 ) -> None:
     streamed = Streamed()
     found = []
@@ -305,7 +314,7 @@ def test_a_fast_vehicle_that_is_asked_to_come_back_brakes_first() -> None:
 def test_a_loop_that_asks_for_this_and_that_asks_for_nothing() -> None:
     streamed = Streamed()
     for number in range(40):
-        back = Demand(velocity=((-1.0) ** number, 0.0, 0.0), yaw_rate=0.0)
+        back = StreamedSetpoint(velocity=((-1.0) ** number, 0.0, 0.0), yaw_rate=0.0)
         assert streamed.asked(back, seconds=0.2) is None
 
 
@@ -313,8 +322,10 @@ def test_a_step_after_a_rest_has_time_to_show_an_effect() -> None:
     """As a law asks for that has held a heading, and is to turn by 180 degrees now."""
     for rest_s in (2.8, 3.0, 9.9):
         streamed = Streamed()
-        assert streamed.asked(Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=0.1), seconds=rest_s) is None
-        turn = Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=170.0)
+        assert (
+            streamed.asked(StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=0.1), seconds=rest_s) is None
+        )
+        turn = StreamedSetpoint(velocity=(0.0, 0.0, 0.0), yaw_rate=170.0)
         assert streamed.asked(turn, seconds=0.5) is None
         assert streamed.asked(turn, seconds=10.0, turns=120.0) is None
 

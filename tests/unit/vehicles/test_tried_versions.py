@@ -8,7 +8,7 @@ import pytest
 
 from volery.vehicles.drivers.ardupilot.versions import COVERAGE as ARDUPILOT
 from volery.vehicles.drivers.px4.versions import COVERAGE as PX4
-from volery.vehicles.firmware_versions import FirmwareVersion, Meaning, Rule, stated_version
+from volery.vehicles.firmware_versions import FirmwareVersion, Meaning, VersionRule, stated_version
 from volery.vehicles.tried_versions import OPERATIONS, TABLE, row_of, tried
 
 
@@ -40,7 +40,7 @@ def test_what_is_said_about_a_version(autopilot: str, stated: int, said: str) ->
 
 
 def test_a_version_that_no_meaning_covers_gets_the_newest() -> None:
-    rule = Rule("a bit", Meaning((1, 13), "older", ""), Meaning((1, 16), "newer", ""))
+    rule = VersionRule("a bit", Meaning((1, 13), "older", ""), Meaning((1, 16), "newer", ""))
     given = {(1, 12): "newer", (1, 13): "older", (1, 15): "older", (1, 16): "newer", (3, 0): "newer"}
     for (major, minor), meaning in given.items():
         assert rule.by(FirmwareVersion(major, minor, 9)) == meaning

@@ -14,7 +14,7 @@ from volery.base.position import AboveHome, Position
 from volery.run.connect import attach, connect
 from volery.vehicles import Rover
 from volery.vehicles.drivers.mavlink.services import item_fields
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.vehicle_plan import Plan
 
 NONE = (0.0, 0.0, 0.0, 0.0)
@@ -70,7 +70,7 @@ def test_what_is_wrong_is_named(read: Any, content: Any, said: str) -> None:
 
 def test_an_item_of_the_api_with_a_place_has_an_altitude() -> None:
     with pytest.raises(UsageError, match="has a place and no altitude"):
-        Plan((Item(WAYPOINT, 3, NONE, 46.0, -103.0, nan),))
+        Plan((PlanItem(WAYPOINT, 3, NONE, 46.0, -103.0, nan),))
 
 
 def test_a_home_of_unknown_height_is_none(read: Any) -> None:
@@ -91,11 +91,11 @@ def test_parameters_of_a_command_without_a_place_are_none(read: Any) -> None:
     plan = read(document(entry(DIGICAM, *NONE, 1, 7, 0, frame=2), entry(1000, *NONE, 128, 0, 1, frame=0)))
     fields = [item_fields(item, number, 0) for number, item in enumerate(plan.mission)]
     assert [(one["x"], one["y"]) for one in fields] == [(1, 7), (128, 0)]
-    there = item_fields(Item(WAYPOINT, 3, NONE, *PLACE), 0, 0)
+    there = item_fields(PlanItem(WAYPOINT, 3, NONE, *PLACE), 0, 0)
     assert (there["x"], there["y"]) == (460_825_000, -1_038_995_000)
     start = read(document(entry(189, *NONE, 47.397, 8.5, 0, frame=2))).mission[0]  # a place that PX4 ignores
     assert (start.latitude, item_fields(start, 0, 0)["x"]) == (47.397, 47)
-    local = item_fields(Item(WAYPOINT, 1, NONE, 12.5, -3.0, 5.0), 0, 0)
+    local = item_fields(PlanItem(WAYPOINT, 1, NONE, 12.5, -3.0, 5.0), 0, 0)
     assert (local["x"], local["y"]) == (125_000, -30_000)
 
 
@@ -115,7 +115,7 @@ def test_a_file_of_mission_planner(read: Any) -> None:
 
 def test_a_place_of_return_and_frames_are_kept(tmp_path: Path) -> None:
     back = Position(46.0, -103.0, AboveHome(30.0))
-    plan = Plan((Item(WAYPOINT, 10, NONE, *PLACE),), breach_return=back, autopilot=3, vehicle=10)
+    plan = Plan((PlanItem(WAYPOINT, 10, NONE, *PLACE),), breach_return=back, autopilot=3, vehicle=10)
     file = tmp_path / "kept.plan"
     plan.write(file)
     assert json.loads(file.read_text())["mission"]["items"][0]["AltitudeMode"] == 4
@@ -134,7 +134,7 @@ def test_a_file_that_cannot_be_written_stays(tmp_path: Path, monkeypatch: pytest
 
     monkeypatch.setattr("volery.base.files.write_text", full)
     with pytest.raises(UsageError, match="No space left on device"):
-        Plan((Item(WAYPOINT, 3, NONE, *PLACE),)).write(file)
+        Plan((PlanItem(WAYPOINT, 3, NONE, *PLACE),)).write(file)
     assert file.read_text() == before
     assert list(tmp_path.iterdir()) == [file]
 
@@ -143,11 +143,11 @@ def test_a_file_that_cannot_be_written_stays(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_refused_item_is_named_and_rally_points_are_bounded() -> None:
-    up = Item(TAKEOFF, 3, NONE, *PLACE)
+    up = PlanItem(TAKEOFF, 3, NONE, *PLACE)
     with connect("sim:ardupilot?start=warm") as drone:
         drone.wait_ready()
         with pytest.raises(Refused, match=r"does not take item 2, MAV_CMD_NAV_FOLLOW \(25\) in a mission"):
-            drone.plan.upload(Plan((up, Item(25, 3, NONE, *PLACE))), only="mission")
+            drone.plan.upload(Plan((up, PlanItem(25, 3, NONE, *PLACE))), only="mission")
         far = Position(PLACE[0], PLACE[1], AboveHome(-1000.0))
         with pytest.raises(OutOfBounds, match="rally point 1"):
             drone.plan.upload(Plan(rally=(far,)), only="rally")
@@ -161,7 +161,7 @@ def test_a_downloaded_plan_is_of_its_vehicle(autopilot: str, kind: str, head: tu
     url = f"sim:{autopilot}?start=warm&kind={'rover' if kind == 'rover' else 'multirotor'}"
     with connect(url, Rover) if kind == "rover" else connect(url) as vehicle:
         vehicle.wait_ready()
-        vehicle.plan.upload(Plan((Item(WAYPOINT, 3, NONE, *PLACE),)), only="mission")
+        vehicle.plan.upload(Plan((PlanItem(WAYPOINT, 3, NONE, *PLACE),)), only="mission")
         found = vehicle.plan.download()
         assert (found.autopilot, found.vehicle) == head
         assert found.home is not None

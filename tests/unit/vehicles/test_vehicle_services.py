@@ -20,7 +20,7 @@ from volery.vehicles import Drone, Fence, Zone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4
 from volery.vehicles.rtcm import crc24q
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.vehicle_plan import Circle, Plan, Polygon
 
 
@@ -46,9 +46,9 @@ def corner(east: float, north: float) -> tuple[float, float]:
     return place.latitude, place.longitude
 
 
-def waypoint(east: float, north: float, height: float = 10.0) -> Item:
+def waypoint(east: float, north: float, height: float = 10.0) -> PlanItem:
     place = at(east, north, height)
-    return Item(16, 3, (0.0, 0.0, 0.0, nan), place.latitude, place.longitude, height)
+    return PlanItem(16, 3, (0.0, 0.0, 0.0, nan), place.latitude, place.longitude, height)
 
 
 @BOTH
@@ -106,7 +106,7 @@ def test_parameters_that_do_not_fit(strip: type[Airstrip], known: str, tmp_path:
 @BOTH
 def test_a_plan_goes_up_and_comes_back(strip: type[Airstrip], known: str, tmp_path: Path) -> None:
     plan = Plan(
-        mission=(waypoint(10, 10), Item(177, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0), waypoint(20, 10)),
+        mission=(waypoint(10, 10), PlanItem(177, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0), waypoint(20, 10)),
         fence=(
             Polygon((corner(-90, -90), corner(90, -90), corner(90, 90), corner(-90, 90))),
             Circle(corner(60, 60), 10.0, stay_in=False),
@@ -139,8 +139,8 @@ def test_an_uploaded_plan_is_flown(strip: type[Airstrip], known: str) -> None:
 
     def mission(drone: Drone) -> float:
         drone.wait_ready()
-        takeoff = Item(22, 3, (0.0, 0.0, 0.0, nan), *corner(0, 0), 10.0)
-        back = Item(20, 2, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+        takeoff = PlanItem(22, 3, (0.0, 0.0, 0.0, nan), *corner(0, 0), 10.0)
+        back = PlanItem(20, 2, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
         drone.plan.upload(Plan((takeoff, waypoint(0, 30), back)), only=["mission"])
         history = drone.record_telemetry("altitude", period=1.0)
         drone.start_mission()

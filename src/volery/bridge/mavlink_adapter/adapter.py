@@ -28,9 +28,9 @@ from volery.bridge.mavlink_adapter.command_handler import (
     result_of,
 )
 from volery.bridge.mavlink_adapter.drone_commands import (
+    ChannelsOverride,
     CommandDecoder,
     MavlinkCommand,
-    RcChannels,
     from_int,
     from_long,
     global_position,
@@ -74,7 +74,7 @@ MISSION_RESULTS: Mapping[int, int] = {
 
 
 @dataclass
-class _Upload:
+class _StationUpload:
     count: int
     items: list[Fields] = field(default_factory=list)
 
@@ -84,7 +84,7 @@ class MissionTransfer:
 
     def __init__(self, commands: CommandHandler, send: Send, report: Report) -> None:
         self._commands, self._send, self._report = commands, send, report
-        self._upload: _Upload | None = None
+        self._upload: _StationUpload | None = None
         self._on_board: list[Fields] | None = None
 
     def handlers(self) -> Mapping[str, Callable[[Fields], None]]:
@@ -115,7 +115,7 @@ class MissionTransfer:
         if not fields["count"]:
             self._refuse("take its mission away")
             return
-        self._upload = _Upload(fields["count"])
+        self._upload = _StationUpload(fields["count"])
         self._send("MISSION_REQUEST_INT", {"seq": 0})
 
     def _handle_item(self, fields: Fields) -> None:
@@ -217,7 +217,7 @@ class MavlinkAdapter:
         self._telemetry = TelemetryEncoder(kernel, driver)
         self._commands = CommandHandler(kernel, driver, context, self._warn)
         self._decoder = CommandDecoder(self._commands.drone)
-        self._channels = RcChannels()
+        self._channels = ChannelsOverride()
         self._text_numbers = count(1)
         self._forwarded: StatusText | None = None  # last text of the vehicle that was forwarded
         self._state: tuple[object, ...] = ()

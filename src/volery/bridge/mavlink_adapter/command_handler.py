@@ -60,7 +60,7 @@ class DroneOperation(NamedTuple):
     by_hand: bool = False
 
 
-class Target(Protocol):
+class BridgeSetpoint(Protocol):
     """A set-point. ``persistent``: it is valid until the next one, so repeating it has no effect."""
 
     persistent: ClassVar[bool]
@@ -96,8 +96,8 @@ class CommandHandler:
         self._kernel, self._driver, self._context, self._report = kernel, driver, context, report
         self._scope = self._new_scope()
         self._running: _RunningOperation | None = None
-        self._target: Target | None = None  # the valid set-point
-        self._next: Target | None = None
+        self._target: BridgeSetpoint | None = None  # the valid set-point
+        self._next: BridgeSetpoint | None = None
         self._flies_targets = False  # the task of set-points runs
         self._not_before: Ns = 0
         self._last_report = ""
@@ -177,7 +177,7 @@ class CommandHandler:
 
     # -- set-points
 
-    def set_target(self, target: Target) -> None:
+    def set_target(self, target: BridgeSetpoint) -> None:
         """Fly to a set-point from now on, unless a command is in progress."""
         if self._running is not None:
             current = self._running.operation.description

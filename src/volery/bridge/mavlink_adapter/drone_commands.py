@@ -12,7 +12,7 @@ from volery.base.errors import CapabilityError, Refused, UsageError, choices
 from volery.base.frames import turn_clockwise
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.bridge.autopilot_link import DJI_ID, PAPARAZZI_ID, AutopilotType, mode_name
-from volery.bridge.mavlink_adapter.command_handler import DroneOperation, Target
+from volery.bridge.mavlink_adapter.command_handler import BridgeSetpoint, DroneOperation
 from volery.bridge.mavlink_adapter.telemetry_encoder import CUSTOM_MODE_ENABLED, local_frame
 from volery.links.mavlink_messages import constant, entry_name
 from volery.vehicles.driver import ManualControl
@@ -88,7 +88,7 @@ class VelocityTarget:
         drone.set_velocity(*self.velocity, yaw_rate=self.yaw_rate)
 
 
-def local_target(fields: Fields, seen: Telemetry) -> Target:
+def local_target(fields: Fields, seen: Telemetry) -> BridgeSetpoint:
     """Return the target in a SET_POSITION_TARGET_LOCAL_NED, relative to home or to the current position.
 
     Raises:
@@ -99,7 +99,7 @@ def local_target(fields: Fields, seen: Telemetry) -> Target:
     return _velocity_target(fields, seen)
 
 
-def global_target(fields: Fields, seen: Telemetry) -> Target:
+def global_target(fields: Fields, seen: Telemetry) -> BridgeSetpoint:
     """Return the target in a SET_POSITION_TARGET_GLOBAL_INT; see ``local_target``."""
     if _contains(fields, NO_POSITION):
         goal = global_position(
@@ -159,7 +159,7 @@ UNUSED = 32_767
 _NEUTRAL = {"x": 0.0, "y": 0.0, "z": 0.5, "r": 0.0}
 
 
-class RcChannels:
+class ChannelsOverride:
     """The first four channels of RC_CHANNELS_OVERRIDE: roll, pitch (low is forward), throttle, yaw."""
 
     def __init__(self) -> None:

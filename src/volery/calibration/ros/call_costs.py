@@ -34,7 +34,7 @@ OFTEN_NS = 32 * MS
 """Cycles below this are frequent: halfway between the two periods of campaigns, 20 and 50 ms."""
 
 
-class Sample(NamedTuple):
+class ProbeSample(NamedTuple):
     """One line of a probe: a number of cycles, their CPU times and their time on the wall clock, ns."""
 
     what: str
@@ -49,13 +49,13 @@ class Sample(NamedTuple):
         return float(getattr(self, clock)) / self.cycles
 
 
-Round = tuple[Sample, ...]
+Round = tuple[ProbeSample, ...]
 
 
 def read_round(lines: Iterable[str]) -> Round:
     """Parse the output of a probe; raise ``LinkError`` if it is not a measurement."""
     try:
-        return tuple(Sample(**json.loads(line)) for line in lines if line.startswith("{"))
+        return tuple(ProbeSample(**json.loads(line)) for line in lines if line.startswith("{"))
     except (ValueError, TypeError) as error:
         raise LinkError(f"the output of a probe is not a measurement: {error}") from error
 
@@ -93,7 +93,7 @@ class _RoundAnalysis:
 
     def __init__(self, samples: Round, clock: Clock) -> None:
         self._clock: Clock = clock
-        self._by_name: Mapping[str, list[Sample]] = _grouped(samples)
+        self._by_name: Mapping[str, list[ProbeSample]] = _grouped(samples)
         nothing = self._by_name.get("nothing", [])
         self._own = median([one.each(clock) for one in nothing]) if nothing else 0.0
         waiting = self._by_name.get("wait", [])
@@ -103,7 +103,7 @@ class _RoundAnalysis:
         spent = sum(one.each(clock) - self._own for one in settling)
         self._idle = max(0.0, spent / waited) if waited else 0.0
 
-    def _alone(self, one: Sample) -> float:
+    def _alone(self, one: ProbeSample) -> float:
         """Return the time of a single call without what the idle process would have spent."""
         return one.each(self._clock) - self._own - self._idle * one.waited_ns
 
@@ -170,20 +170,20 @@ class _RoundAnalysis:
         for one in self._by_name.get("serve", []):
             yield "serve", 0.0, self._received(one)
 
-    def _received(self, one: Sample) -> float:
+    def _received(self, one: ProbeSample) -> float:
         """Return the time of one message or request that was received while the process waited, ns."""
         return one.each(self._clock) - self._wait * one.waited_ns / one.cycles
 
 
-def _by_period(one: Sample, topics: float = 1.0) -> str:
+def _by_period(one: ProbeSample, topics: float = 1.0) -> str:
     """Return the ending of the names of calls in cycles as short as these, of one message of each topic."""
     return "_often" if one.waited_ns * topics < OFTEN_NS * one.cycles else ""
 
 
-def _grouped(samples: Round) -> dict[str, list[Sample]]:
-    found: dict[str, list[Sample]] = {}
-    for one in samples:
-        found.setdefault(one.what, []).append(one)
+def _grouped(samples: Round) -> dict[str, list[ProbeSample]]:
+    found: dict[str, list[ProbeSample]] = {}
+    for sample in samples:
+        found.setdefault(sample.what, []).append(sample)
     return found
 
 

@@ -18,7 +18,7 @@ from statistics import median
 from volery.base.errors import UsageError
 from volery.base.seeds import stream
 from volery.calibration.host_machine import Machine, put_law
-from volery.calibration.ros.call_costs import CallCost, CostLine, Round, Sample, call_costs
+from volery.calibration.ros.call_costs import CallCost, CostLine, ProbeSample, Round, call_costs
 from volery.calibration.ros.probe_environment import Pace, ProbeSetup
 from volery.cost import CallFigures, Line, RosLaw, line_through, read_catalogue
 
@@ -36,7 +36,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RoundPlan:
     """Least and greatest number of rounds, and the relative precision ``within`` of each figure."""
 
     least: int = 10
@@ -59,7 +59,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Progress:
+class RoundProgress:
     """State after a round: completed rounds, most rounds, figures that are not known well enough yet."""
 
     rounds: int
@@ -67,7 +67,7 @@ class Progress:
     loose: tuple[CallCost, ...]
 
 
-Show = Callable[[Progress], None]
+Show = Callable[[RoundProgress], None]
 
 
 class CampaignLog:
@@ -84,7 +84,9 @@ class CampaignLog:
         lines = file.read_text(encoding="utf-8").splitlines()
         try:
             known = json.loads(lines[0])
-            self.rounds = [tuple(Sample(*one) for one in json.loads(line)) for line in _whole(lines[1:])]
+            self.rounds = [
+                tuple(ProbeSample(*load) for load in json.loads(line)) for line in _whole(lines[1:])
+            ]
         except (IndexError, ValueError, TypeError, RecursionError) as error:
             raise UsageError(f"{file} holds no rounds of a campaign: remove it") from error
         if known != header:
@@ -109,7 +111,7 @@ def _whole(lines: list[str]) -> Iterator[str]:
 
 
 def run_campaign(
-    stage: ProbeSetup, plan: Plan, notebook: CampaignLog, show: Show = lambda progress: None
+    stage: ProbeSetup, plan: RoundPlan, notebook: CampaignLog, show: Show = lambda progress: None
 ) -> None:
     """Measure rounds until all figures are precise or the plan's greatest number is reached.
 
@@ -125,7 +127,7 @@ def run_campaign(
     while True:
         done = len(notebook.rounds)
         loose = uncertain_costs(notebook.rounds, plan.within) if done >= plan.least else ()
-        show(Progress(done, plan.most, loose))
+        show(RoundProgress(done, plan.most, loose))
         if done >= plan.most or (done >= plan.least and not loose):
             return
         notebook.keep(stage.probe(plan.pace_of(done)))

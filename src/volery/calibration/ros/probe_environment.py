@@ -141,8 +141,8 @@ def roscpp_program(
     """
     compile_with, link_with = roscpp_flags()
     tools = CppToolchain(name)
-    objects = [tools.object_file(one, flags=[*compile_with, *flags]) for one in sources]
-    return tools.executable(objects, [*(f"-l{one}" for one in libraries), *link_with])
+    objects = [tools.object_file(source, flags=[*compile_with, *flags]) for source in sources]
+    return tools.executable(objects, [*(f"-l{library}" for library in libraries), *link_with])
 
 
 @contextmanager

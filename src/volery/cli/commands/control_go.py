@@ -10,13 +10,13 @@ import typer
 
 from volery.base.errors import UsageError
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import IfKilled, Out, Seed, Speed, parse_speed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from volery.control.manoeuvres import Manoeuvre
+    from volery.control.manoeuvres import LawManoeuvre
     from volery.control.safety_switch import SwitchSettings
     from volery.run.go import GoSettings
     from volery.trace.events import Event
@@ -61,7 +61,7 @@ class SwitchOptions:
         ),
     ] = "autopilot"
 
-    def settings(self, on: str, output: Output) -> SwitchSettings | None:
+    def settings(self, on: str, output: CommandOutput) -> SwitchSettings | None:
         """Return the settings of the switch of the vehicle at *on*, or None to fly without.
 
         Raises:
@@ -107,7 +107,7 @@ class FlightOptions(SwitchOptions):
     speed: Speed = "max"
     out: Out = None
 
-    def flight(self, height: float, output: Output) -> GoSettings:
+    def flight(self, height: float, output: CommandOutput) -> GoSettings:
         """Return the settings of a flight that takes off to *height* m.
 
         Raises:
@@ -126,7 +126,7 @@ class FlightOptions(SwitchOptions):
 
 @commands.add("quiet", "json", "debug")
 def rotation(
-    output: Output,
+    output: CommandOutput,
     options: FlightOptions,
     angle: Annotated[
         list[float], typer.Option(help="Heading in degrees, clockwise from north; may be repeated.")
@@ -142,7 +142,7 @@ def rotation(
 
 @commands.add("quiet", "json", "debug")
 def altitude(
-    output: Output,
+    output: CommandOutput,
     options: FlightOptions,
     to: Annotated[list[float], typer.Option(help="Height above home in metres; may be repeated.")],
     hold: Hold = 15.0,
@@ -156,7 +156,7 @@ def altitude(
 
 @commands.add("quiet", "json", "debug")
 def waypoints(
-    output: Output,
+    output: CommandOutput,
     options: FlightOptions,
     point: Annotated[
         list[str] | None,
@@ -181,7 +181,7 @@ def waypoints(
         raise UsageError(f"--cube {cube:g}: give a side above 0 m")
     points = [_point(one) for one in point or []] if cube is None else manoeuvres.cube(cube, height)
 
-    def make() -> Manoeuvre:
+    def make() -> LawManoeuvre:
         return manoeuvres.Waypoints(points, tolerance=tolerance, hold_s=hold, rounds=rounds)
 
     return _go(output, "waypoints", make, options, height)
@@ -189,7 +189,7 @@ def waypoints(
 
 @commands.add("quiet", "json", "debug")
 def land(
-    output: Output,
+    output: CommandOutput,
     options: FlightOptions,
     height: Height = 10.0,
 ) -> int:
@@ -201,7 +201,7 @@ def land(
 
 @commands.add("quiet", "json", "debug")
 def cube(
-    output: Output,
+    output: CommandOutput,
     graph: Annotated[
         str | None,
         typer.Option(
@@ -246,7 +246,7 @@ def _point(text: str) -> tuple[float, float, float]:
 
 
 def _go(
-    output: Output, name: str, make: Callable[[], Manoeuvre], options: FlightOptions, height: float
+    output: CommandOutput, name: str, make: Callable[[], LawManoeuvre], options: FlightOptions, height: float
 ) -> int:
     from volery.cli.run_display import run_folder, run_progress, show_outcome
     from volery.run.go import go

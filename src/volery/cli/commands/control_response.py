@@ -11,7 +11,7 @@ from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import Out
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from volery.control.step_response import Judgement, Signal, StepResponse
+    from volery.control.step_response import ControlledSignal, Judgement, StepResponse
 
 commands = Commands("control")
 
@@ -28,7 +28,7 @@ NOTHING = "–"
 
 @commands.add("quiet", "json", "debug")
 def response(
-    output: Output,
+    output: CommandOutput,
     files: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -74,7 +74,7 @@ def response(
         raise UsageError("give the record of a flight, or --thesis")
     if goal is not None and measured is None:
         raise UsageError(f"--goal {goal}: state --measured, too")
-    found: list[tuple[Path, Signal, Judgement]] = []
+    found: list[tuple[Path, ControlledSignal, Judgement]] = []
     for file in files:
         if not file.exists():
             raise UsageError(f"there is no file or folder {file}")
@@ -93,16 +93,16 @@ def response(
     return OK
 
 
-def _chosen(signals: Sequence[Signal], names: Sequence[str], file: Path) -> list[Signal]:
+def _chosen(signals: Sequence[ControlledSignal], names: Sequence[str], file: Path) -> list[ControlledSignal]:
     """Return the signals called *names*, all if there are none."""
-    known = [one.name for one in signals]
+    known = [signal.name for signal in signals]
     for name in names:
         if name not in known:
             raise UsageError(f"{file} has no signal {name!r}; it has {', '.join(known)}")
-    return [one for one in signals if not names or one.name in names]
+    return [signal for signal in signals if not names or signal.name in names]
 
 
-def _named(file: Path, signal: Signal, several: bool) -> Signal:
+def _named(file: Path, signal: ControlledSignal, several: bool) -> ControlledSignal:
     """Return the signal with the name of its record, if there are several and it names no controller."""
     from dataclasses import replace
 
@@ -114,7 +114,7 @@ WIDEST_NAME = 8
 
 
 def _tables(
-    judged: Sequence[tuple[Path, Signal, Sequence[StepResponse]]], *, several: bool
+    judged: Sequence[tuple[Path, ControlledSignal, Sequence[StepResponse]]], *, several: bool
 ) -> list[Table | Text | str]:
     """Return one table for each quantity, with the responses of all records, for 80 characters."""
     from volery.control.step_response import COLUMNS
@@ -151,7 +151,9 @@ def _tables(
     return shown or ["no step was found; --step gives the least size of one"]
 
 
-def _title(name: str, unit: str, same: Sequence[tuple[Path, Signal, Sequence[StepResponse]]]) -> Text:
+def _title(
+    name: str, unit: str, same: Sequence[tuple[Path, ControlledSignal, Sequence[StepResponse]]]
+) -> Text:
     """Return what a table is about, and by how much its steps may be dated too late."""
     about = [f"{name} in {unit}" if unit else name, "times in s"]
     late = max(found.resolution for _, _, responses in same for found in responses)
@@ -162,7 +164,7 @@ def _title(name: str, unit: str, same: Sequence[tuple[Path, Signal, Sequence[Ste
     return Text(", ".join(about), "bold")
 
 
-def _not_judged(judged: Sequence[tuple[Path, Signal, Judgement]], *, several: bool) -> list[Text]:
+def _not_judged(judged: Sequence[tuple[Path, ControlledSignal, Judgement]], *, several: bool) -> list[Text]:
     """Return a line for each reason for which changes of set-points were not judged."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for file, one, result in judged:
@@ -198,7 +200,7 @@ def _cell(found: StepResponse, field: str) -> str:
     return f"{value:.1f}" if field == "start" else f"{value:.2f}"
 
 
-def _thesis(output: Output, out: Path | None, plot: Path | None) -> int:
+def _thesis(output: CommandOutput, out: Path | None, plot: Path | None) -> int:
     from volery.cli.run_display import run_folder
     from volery.control.step_response import as_record
     from volery.report.response_figure import draw_comparison

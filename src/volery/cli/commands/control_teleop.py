@@ -11,7 +11,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.cli.command import FAILED, Commands
 from volery.cli.commands.control_go import By, Height
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import IfKilled, Out, Seed
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ commands = Commands("control")
 
 @commands.add("quiet", "json", "debug")
 def teleop(
-    output: Output,
+    output: CommandOutput,
     url: Annotated[str, typer.Argument(help="Address of the vehicle, such as sim:ardupilot.")],
     joystick: Annotated[
         Path | None,
@@ -45,7 +45,7 @@ def teleop(
     from volery.vehicles.address import parse
 
     settings = GoSettings(by=by, height=height)
-    limits = teleoperation.Limits(speed=speed_limit, turn=turn_limit)
+    limits = teleoperation.TeleopLimits(speed=speed_limit, turn=turn_limit)
     pace = 1.0 if parse(url).in_virtual_time else None
     with ExitStack() as stack:
         source: Input
@@ -77,7 +77,7 @@ def teleop(
 
 @commands.add("quiet", "json", "debug")
 def twin(
-    output: Output,
+    output: CommandOutput,
     source: Annotated[
         str,
         typer.Argument(help="Record (run folder, bag, tlog, .bin, .ulg) or address of a vehicle to follow."),
@@ -116,8 +116,10 @@ def twin(
             table.add_row(one.quantity, one.unit, f"{one.rms:.2f}", f"{one.p95:.2f}", f"{one.greatest:.2f}")
         output.show(table)
         output.note(found.judged)
-        output.give({one.quantity: one._asdict() for one in found.errors})
+        output.give({error.quantity: error._asdict() for error in found.errors})
         if plot is not None:
-            draw_records([(one, ()) for one in read_signals(folder) if one.controller == "twin"], plot)
+            draw_records(
+                [(signal, ()) for signal in read_signals(folder) if signal.controller == "twin"], plot
+            )
             output.note(f"plot: {plot}")
-    return show_outcome(Output(quiet=True, debug=output.debug) if output.json else output, found.run)
+    return show_outcome(CommandOutput(quiet=True, debug=output.debug) if output.json else output, found.run)

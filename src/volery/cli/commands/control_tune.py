@@ -11,7 +11,7 @@ import typer
 from volery.base.files import write_text
 from volery.cli.command import OK, Commands
 from volery.cli.commands.control_go import By, On, SwitchOptions
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import Out, Seed
 
 commands = Commands("control", "Fly by control laws of this program or by hand; tune loops, judge responses.")
@@ -19,7 +19,7 @@ commands = Commands("control", "Fly by control laws of this program or by hand; 
 
 @commands.add("quiet", "json", "debug")
 def tune(
-    output: Output,
+    output: CommandOutput,
     loop: Annotated[str, typer.Argument(metavar="rotation|altitude", help="Loop to tune.")],
     on: On,
     switch: SwitchOptions,

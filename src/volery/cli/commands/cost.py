@@ -17,7 +17,7 @@ from volery.base.errors import EstimateError, UsageError
 from volery.base.installed import require_extra
 from volery.base.time import from_seconds, to_seconds
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import Allocation, Fidelity, Model, Overrides, Scenario, Seed
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ VISIBLE_SHARE, HIGH_SHARE = 0.0005, 0.05
 
 @commands.add("quiet", "json", "debug")
 def cost(
-    output: Output,
+    output: CommandOutput,
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Sources in C or C++.")],
     on: Annotated[
         str,
@@ -178,7 +178,7 @@ def _si(value: float, unit: str) -> str:
 
 @commands.add("quiet", "json", "debug")
 def profile(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     seed: Seed = 1,
     allocation: Allocation = None,
@@ -227,7 +227,7 @@ def _profile_table(profiles: Sequence[ComponentProfile]) -> Table:
 
 @commands.add("quiet", "json", "debug")
 def validate(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     runs: Annotated[int, typer.Option(help="Number of runs; medians and quartiles are shown.")] = 10,
     seconds: Annotated[
@@ -289,7 +289,7 @@ def validate(
 
 
 @contextmanager
-def _status(output: Output, runs: int, seconds: float) -> Iterator[ShowRun]:
+def _status(output: CommandOutput, runs: int, seconds: float) -> Iterator[ShowRun]:
     if not output.shows_progress:
         yield lambda done: None
         return
@@ -299,7 +299,9 @@ def _status(output: Output, runs: int, seconds: float) -> Iterator[ShowRun]:
 
 def comparison_tables(found: Sequence[NodeComparison], system: System) -> Iterator[Table | Text]:
     """Yield the CPU time of each node, estimated and measured, and the value of estimating ROS calls."""
-    host = ", ".join(f"{one.kind} at {one.frequency_mhz:g} MHz" for one in system.processors)
+    host = ", ".join(
+        f"{processor.kind} at {processor.frequency_mhz:g} MHz" for processor in system.processors
+    )
     seconds = to_seconds(system.limits.duration_ns)
     yield Text(f"{system.name}: CPU time of each node in {seconds:g} s; estimated for {host}", style="bold")
     yield _cpu_time_table(found)

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from volery.base.errors import UsageError
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import CATALOGUE, CatalogueFile, EntryName, Frequency
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ MAX_LOOSE_SHOWN = 5
 
 
 @contextmanager
-def _progress_bar(output: Output, description: str, detail: str) -> Iterator[Callable[[int, int, str], None]]:
+def _progress_bar(
+    output: CommandOutput, description: str, detail: str
+) -> Iterator[Callable[[int, int, str], None]]:
     """Yield a function that shows *done* of *total* rounds and a detail."""
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[detail]}"))
     with Progress(
@@ -41,7 +43,7 @@ def _progress_bar(output: Output, description: str, detail: str) -> Iterator[Cal
 
 @commands.add("quiet", "json", "debug")
 def ros(
-    output: Output,
+    output: CommandOutput,
     client: Annotated[str, typer.Option(metavar="roscpp|rospy|rclpy", help="Client library.")],
     out: CatalogueFile = CATALOGUE,
     frequency: Frequency = None,
@@ -70,18 +72,18 @@ def ros(
         LEAST_ROUNDS,
         CampaignLog,
         Conditions,
-        Plan,
+        RoundPlan,
         plot_svg,
         ros_law,
         run_campaign,
         uncertain_costs,
         write_entry,
     )
-    from volery.calibration.ros.campaign import Progress as Rounds
+    from volery.calibration.ros.campaign import RoundProgress as Rounds
     from volery.calibration.ros.probe_environment import check_client, probe_setup
 
     check_client(client, python)  # before any file is made
-    plan = Plan(*rounds, within / 100.0)
+    plan = RoundPlan(*rounds, within / 100.0)
     machine = this_machine(name, catalogue=out)
     rounds_file = out.with_name(f"{out.name}.{client}.rounds")
     complete = True
@@ -153,7 +155,7 @@ def _call_table(found: Mapping[str, CallCost], title: str) -> Table:
 
 @commands.add("quiet", "json", "debug")
 def python(
-    output: Output,
+    output: CommandOutput,
     out: CatalogueFile = CATALOGUE,
     frequency: Frequency = None,
     name: EntryName = "",
@@ -257,7 +259,7 @@ def _write_text(file: Path, text: str) -> None:
 
 @commands.add("quiet", "debug")
 def libraries(
-    output: Output,
+    output: CommandOutput,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Table to be written.")],
     only: Annotated[
         list[str] | None,
@@ -296,7 +298,7 @@ def libraries(
 
 
 @commands.add("quiet", "json", "debug")
-def processor(output: Output, out: CatalogueFile = CATALOGUE, name: EntryName = "") -> int:
+def processor(output: CommandOutput, out: CatalogueFile = CATALOGUE, name: EntryName = "") -> int:
     """Measure the cost of compiled code on this machine and write it as an entry of a catalogue.
 
     Measured are operations, library calls, branch mispredictions, caches and memory. `volery cost` and C++

@@ -13,7 +13,7 @@ from volery.base import units
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.installed import require_extra
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from volery.explore.campaign import Campaign, CampaignProgress
     from volery.explore.campaign_page import Findings
     from volery.explore.flight_phases import Phases
-    from volery.explore.points import Row
+    from volery.explore.points import CampaignRow
     from volery.explore.search import Objective
 
 commands = Commands()
@@ -35,7 +35,7 @@ SHOWN_REASONS = 8
 
 @commands.add("quiet", "json", "debug")
 def explore(
-    output: Output,
+    output: CommandOutput,
     model: Annotated[
         Path | None,
         typer.Argument(help="Model file, or folder with a model.yaml; none to resume a campaign."),
@@ -321,7 +321,7 @@ def _progress_text(progress: CampaignProgress) -> str:
     return f"{progress.finished} of {progress.asked} runs{f' ({others})' if others else ''}{left}"
 
 
-def _show(output: Output, folder: Path, run: int) -> int:
+def _show(output: CommandOutput, folder: Path, run: int) -> int:
     """Make a run again."""
     from volery.cli.run_display import show_outcome
     from volery.explore.campaign import Campaign
@@ -335,11 +335,11 @@ def _show(output: Output, folder: Path, run: int) -> int:
     return show_outcome(output, made)
 
 
-def _values(row: Row) -> str:
+def _values(row: CampaignRow) -> str:
     return "".join(f"{path} = {value}, " for path, value in row.point.values.items())
 
 
-def _show_summary(output: Output, folder: Path, findings: Findings) -> int:
+def _show_summary(output: CommandOutput, folder: Path, findings: Findings) -> int:
     """Show what a campaign came to, and what its method found. Return the exit status."""
     from volery.explore.campaign import Campaign
     from volery.report.terminal import GridTable
@@ -347,8 +347,8 @@ def _show_summary(output: Output, folder: Path, findings: Findings) -> int:
     with Campaign(folder) as campaign:
         found = _summary(campaign)
     variants, reasons = found["variants"], found["reasons"]
-    varied = list(dict.fromkeys(path for one in variants for path in one["values"]))
-    names = list(dict.fromkeys(name for one in variants for name in one["met"]))
+    varied = list(dict.fromkeys(path for variant in variants for path in variant["values"]))
+    names = list(dict.fromkeys(name for variant in variants for name in variant["met"]))
     table = make_table(*varied, number_column("runs"), number_column("completed"), *map(number_column, names))
     for one in variants[:SHOWN_VARIANTS]:
         shares = [f"{one['met'].get(name, 0)}/{one['judged'].get(name, 0)}" for name in names]

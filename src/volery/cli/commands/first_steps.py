@@ -35,7 +35,7 @@ from volery.base.errors import CapabilityError, UsageError, VoleryError
 from volery.base.installed import install_command, require_extra
 from volery.base.process import on_ending_signals
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import Seed
 from volery.simulation.real_firmware.program_search import (
     USUAL_PROGRAMS,
@@ -47,7 +47,7 @@ from volery.simulation.real_firmware.program_search import (
 if TYPE_CHECKING:
     from volery.cli.run_display import Drawings
     from volery.requirements.record import RunRecord
-    from volery.run.result import Progress
+    from volery.run.result import RunProgress
     from volery.vehicles import Vehicle
     from volery.vehicles.firmware_versions import FirmwareVersion
 
@@ -80,7 +80,7 @@ def example(name: str) -> Path:
 
 @commands.add("quiet", "json", "debug")
 def demo(
-    output: Output,
+    output: CommandOutput,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs/demo"),
     seed: Seed = 7,
 ) -> int:
@@ -98,7 +98,9 @@ def demo(
 
     model = example(DEMO_MODEL)
     names = load(model, vocabulary()).allocations[:2]
-    outcomes = run_all(output, {name: Job(model, name, seed, make_folder(out / name)) for name in names})
+    outcomes = run_all(
+        output, {name: QueuedRun(model, name, seed, make_folder(out / name)) for name in names}
+    )
     records = [outcome.record for outcome in outcomes.values()]
     noted = [
         f"{name}: {one.state} at {one.history[-1].at_s:.0f} s {one.history[-1].detail}".rstrip()
@@ -121,7 +123,7 @@ def demo(
 
 @commands.add("quiet", "debug")
 def new(
-    output: Output, folder: Annotated[Path, typer.Argument(help="Folder to create; new or empty.")]
+    output: CommandOutput, folder: Annotated[Path, typer.Argument(help="Folder to create; new or empty.")]
 ) -> int:
     """Create a small model that runs, to start from."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -144,7 +146,7 @@ def new(
 
 
 @dataclass(frozen=True)
-class Job:
+class QueuedRun:
     """A simulation to run at fidelity ``code``."""
 
     model: Path
@@ -167,7 +169,7 @@ class JobOutcome:
         return self.record.outcome.status == "completed" and not self.problems
 
 
-def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
+def run_all(output: CommandOutput, jobs: Mapping[str, QueuedRun]) -> dict[str, JobOutcome]:
     """Run all *jobs* and return their outcomes by name. Raises the error of the first that cannot start."""
     from volery.cli.run_display import live_progress
 
@@ -231,7 +233,7 @@ def _outcomes(sending: Mapping[Connection, str], drawings: Drawings | None) -> d
     return outcomes
 
 
-def _work(name: str, job: Job, to: Connection, of_parent: Sequence[Connection]) -> None:
+def _work(name: str, job: QueuedRun, to: Connection, of_parent: Sequence[Connection]) -> None:
     """Run *job* in its own process, and send its progress and then its outcome or error.
 
     SIGTERM ends it, also when its parent ends. The kernel's own parent-death signal does not serve here: it
@@ -264,7 +266,7 @@ def _end_with_parent() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
 
-def _run(job: Job, show: Callable[[Progress], None]) -> JobOutcome:
+def _run(job: QueuedRun, show: Callable[[RunProgress], None]) -> JobOutcome:
     from volery.run.result import Options
     from volery.run.simulate import simulate
 
@@ -278,7 +280,7 @@ MINIMUM_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True)
-class Part:
+class InstallablePart:
     """Something that may be installed.
 
     ``find`` returns a version or a path, or an empty text if the part is missing.
@@ -292,7 +294,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Finding:
+class FoundPart:
     """A part and what was found of it; ``found`` is empty if it is missing."""
 
     name: str
@@ -318,8 +320,8 @@ def module(name: str) -> Callable[[], str]:
     """Return a function that finds a Python module of any origin, such as Debian's."""
 
     def find() -> str:
-        found = find_spec(name)
-        return (found.origin or "installed") if found else ""
+        spec = find_spec(name)
+        return (spec.origin or "installed") if spec else ""
 
     return find
 
@@ -329,7 +331,7 @@ def program(*names: str) -> Callable[[], str]:
     return lambda: next((found for name in names if (found := shutil.which(name))), "")
 
 
-def _firmware(name: str) -> Part:
+def _firmware(name: str) -> InstallablePart:
     def find() -> str:
         try:
             return str(find_program(name))
@@ -337,23 +339,23 @@ def _firmware(name: str) -> Part:
             return ""
 
     enables = f"real firmware in virtual time: --fidelity firmware, firmware:{project_of(name)}"
-    return Part(name, find, enables, how_to_get(name))
+    return InstallablePart(name, find, enables, how_to_get(name))
 
 
 def _python() -> str:
     return platform.python_version() if sys.version_info >= MINIMUM_PYTHON else ""
 
 
-def _core(name: str, enables: str) -> Part:
-    return Part(name, distribution(name), enables, f"pip install {name}", needed=True)
+def _core(name: str, enables: str) -> InstallablePart:
+    return InstallablePart(name, distribution(name), enables, f"pip install {name}", needed=True)
 
 
-def _optional(name: str, extra: str, enables: str) -> Part:
-    return Part(name, distribution(name), enables, install_command(extra))
+def _optional(name: str, extra: str, enables: str) -> InstallablePart:
+    return InstallablePart(name, distribution(name), enables, install_command(extra))
 
 
-PARTS: tuple[Part, ...] = (
-    Part("Python 3.11 or newer", _python, "everything", "apt install python3", needed=True),
+PARTS: tuple[InstallablePart, ...] = (
+    InstallablePart("Python 3.11 or newer", _python, "everything", "apt install python3", needed=True),
     _core("greenlet", "code that blocks, in virtual time"),
     _core("numpy", "arrays"),
     _core("pymavlink", "MAVLink: ArduPilot, PX4 and ground stations"),
@@ -365,35 +367,41 @@ PARTS: tuple[Part, ...] = (
     _optional("ruamel.yaml", "model", "models and catalogues of processors"),
     _optional("rosbags", "ros", "ROS messages and bags, also without ROS"),
     _optional("jinja2", "report", "HTML reports"),
-    Part(
+    InstallablePart(
         "mavsdk",
         distribution("mavsdk"),
         "to fly `volery vehicle serve` with MAVSDK",
         "pip install 'mavsdk>=3,<4'",
     ),
-    Part(
+    InstallablePart(
         "MAVProxy",
         distribution("MAVProxy"),
         "to fly `volery vehicle serve` by typing",
         "pip install MAVProxy",
     ),
-    Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),
-    Part("rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"),
-    Part(
+    InstallablePart(
+        "rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"
+    ),
+    InstallablePart(
+        "rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"
+    ),
+    InstallablePart(
         "g++ or clang++",
         program("g++", "clang++"),
         "components in C++ (language c++, roscpp or rclcpp)",
         "apt install g++",
     ),
-    Part(
+    InstallablePart(
         "LLVM 17 to 19",
         program("opt-19", "opt-18", "opt-17", "opt"),
         "cost of C++ code on another processor",
         "apt install clang-19 llvm-19",
     ),
     *(_firmware(name) for name in USUAL_PROGRAMS),
-    Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
-    Part(
+    InstallablePart(
+        "addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"
+    ),
+    InstallablePart(
         "a browser",
         program("chromium", "chromium-browser", "google-chrome", "firefox"),
         "to open report.html",
@@ -408,7 +416,7 @@ VehicleUrl = Annotated[
 
 
 @commands.add("json", "debug")
-def doctor(output: Output, vehicle: VehicleUrl = None) -> int:
+def doctor(output: CommandOutput, vehicle: VehicleUrl = None) -> int:
     """Show which parts are installed, what each missing part would enable, and how to install it.
 
     With --vehicle: which firmware answers there, and how this driver was tried with its version.
@@ -416,16 +424,16 @@ def doctor(output: Output, vehicle: VehicleUrl = None) -> int:
     """
     if vehicle is not None:
         return _vehicle(output, vehicle)
-    findings = [Finding(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
+    findings = [FoundPart(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
     for one in findings:
         output.show(_line(one))
-    missing = [one.name for one in findings if one.needed and not one.found]
+    missing = [finding.name for finding in findings if finding.needed and not finding.found]
     output.show(f"missing: {', '.join(missing)}" if missing else "every necessary part is installed")
-    output.give({"ok": not missing, "parts": [asdict(one) for one in findings]})
+    output.give({"ok": not missing, "parts": [asdict(finding) for finding in findings]})
     return FAILED if missing else OK
 
 
-def _vehicle(output: Output, url: str) -> int:
+def _vehicle(output: CommandOutput, url: str) -> int:
     """Show which firmware answers at an address, and what is known about its version."""
     from volery.run.connect import attach
     from volery.vehicles import Drone, Rover
@@ -455,7 +463,7 @@ def _stated(attached: Vehicle) -> tuple[str, FirmwareVersion | None]:
         return seen.autopilot, seen.version
 
 
-def _line(one: Finding) -> Text:
+def _line(one: FoundPart) -> Text:
     if one.found:
         return Text.assemble(
             ("✓ ", "green"), (f"{one.name} ", "bold"), one.found, (f"  {one.enables}", "dim")

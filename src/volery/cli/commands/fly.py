@@ -9,7 +9,7 @@ import typer
 
 from volery.base.errors import UsageError
 from volery.cli.command import Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import IfKilled, LogFile, LogLevel, Out, Record, Seed, Speed, parse_speed
 
 commands = Commands()
@@ -17,7 +17,7 @@ commands = Commands()
 
 @commands.add("quiet", "json", "debug")
 def fly(
-    output: Output,
+    output: CommandOutput,
     mission: Annotated[Path, typer.Argument(help="Python file with `def mission(drone: Drone)`.")],
     on: Annotated[
         list[str],

@@ -12,7 +12,7 @@ from rich.progress import track
 from volery.base.errors import UsageError
 from volery.base.time import clock, to_seconds
 from volery.cli.command import LEFT_OUT, OK, Commands
-from volery.cli.console import Output, make_table
+from volery.cli.console import CommandOutput, make_table
 from volery.cli.options import AllowLoss
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ SHOWN = 5
 
 @commands.add("quiet", "json", "debug")
 def map(  # noqa: A001  # the name of the command
-    output: Output,
+    output: CommandOutput,
     recording: Annotated[
         Path,
         typer.Argument(metavar="FILE", help="Bag (ROS 1, ROS 2, MCAP), log of CARMEN, or table of ranges."),

@@ -13,12 +13,12 @@ from rich.table import Table
 from rich.text import Text
 
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, file_size, make_table, number_column
+from volery.cli.console import CommandOutput, file_size, make_table, number_column
 from volery.cli.options import Allocation, Model, Overrides, Scenario
 
 if TYPE_CHECKING:
     from volery.analysis.budgets import Budgets
-    from volery.analysis.hardware import Part
+    from volery.analysis.hardware import PricedPart
     from volery.analysis.simulated_times import LongestTimes
     from volery.analysis.system_analysis import Analysis, Bound, Utilisation
     from volery.base.time import Ns
@@ -42,7 +42,7 @@ class _Seen(NamedTuple):
 
 @commands.add("quiet", "json", "debug")
 def analyse(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     allocation: Allocation = None,
     scenario: Scenario = None,
@@ -83,7 +83,7 @@ def analyse(
         {
             **asdict(found),
             "budgets": asdict(limits),
-            "hardware": [asdict(one) for one in parts],
+            "hardware": [asdict(part) for part in parts],
             "hardware_price": hardware_price(parts),
             "assumptions": list(ASSUMPTIONS),
         }
@@ -97,11 +97,11 @@ def analyse(
 def _shares(kind: str, shares: Iterable[Utilisation], seen: _Seen | None) -> Iterator[RenderableType]:
     simulated = [number_column("simulated")] if seen else []
     table = make_table(kind, number_column("utilisation"), *simulated)
-    for one in shares:
-        least = "≥ " if one.not_counted else ""
-        record = seen.record.processors.get(one.resource) if seen else None
+    for share in shares:
+        least = "≥ " if share.not_counted else ""
+        record = seen.record.processors.get(share.resource) if seen else None
         beside = [NONE if record is None else f"{record.utilisation:.2%}"] if seen else []
-        table.add_row(one.resource, f"{least}{one.share:.2%}", *beside)
+        table.add_row(share.resource, f"{least}{share.share:.2%}", *beside)
     if table.row_count:
         yield table
 
@@ -177,14 +177,14 @@ def _budgets(found: Budgets) -> Iterator[RenderableType]:
     yield from (one for one in (memory, energy, battery) if _filled(one))
 
 
-def _hardware(parts: Sequence[Part]) -> Iterator[RenderableType]:
+def _hardware(parts: Sequence[PricedPart]) -> Iterator[RenderableType]:
     from volery.analysis.hardware import hardware_price
 
     table = make_table("hardware", "what", number_column("price"), number_column("of the year"), "")
-    for one in parts:
-        year = NONE if one.year is None else str(one.year)
-        estimated = "estimated" if one.estimated else ""
-        table.add_row(one.name, one.what, f"{one.amount:.0f} {one.currency}", year, estimated)
+    for part in parts:
+        year = NONE if part.year is None else str(part.year)
+        estimated = "estimated" if part.estimated else ""
+        table.add_row(part.name, part.what, f"{part.amount:.0f} {part.currency}", year, estimated)
     for currency, amount in hardware_price(parts).items():
         table.add_row("all of it", "", f"{amount:.0f} {currency}", "", "")
     if parts:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from volery.base.errors import UsageError, choices
 from volery.cli.command import BAD_INPUT, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import Model, Overrides
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from volery.checks.findings import CheckedModel
     from volery.model.builder import ModelBuilder
-    from volery.model.rules import Finding
+    from volery.model.rules import BrokenRule
     from volery.model.system import System
 
 commands = Commands("model", "Check, draw, analyse and convert models.")
@@ -31,7 +31,7 @@ Format = Annotated[str, typer.Option("--format", metavar="text|json|sarif", help
 
 
 @commands.add("quiet", "debug")
-def check(output: Output, model: Model, overrides: Overrides = None, format_: Format = "text") -> int:
+def check(output: CommandOutput, model: Model, overrides: Overrides = None, format_: Format = "text") -> int:
     """Check a model with each allocation and scenario; load its Python components, compile those in C++.
 
     The model may be a .uml file. The exit status is 2 if a finding keeps the model from running, else 0.
@@ -42,15 +42,15 @@ def check(output: Output, model: Model, overrides: Overrides = None, format_: Fo
     from volery.checks.sarif import sarif
     from volery.exchange.convert import uml_model
     from volery.model.assembly import model_file
-    from volery.model.rules import NOT_MAPPED, Finding
+    from volery.model.rules import NOT_MAPPED, BrokenRule
     from volery.run.assembly.model_checks import vocabulary
 
     words = vocabulary()
-    notes: tuple[Finding, ...] = ()
+    notes: tuple[BrokenRule, ...] = ()
     source: Path | ModelBuilder = model
     if model.suffix == ".uml":
         source, unmapped = uml_model(model, words.processors)
-        notes = tuple(Finding(NOT_MAPPED, one.what, one.element, one.where) for one in unmapped)
+        notes = tuple(BrokenRule(NOT_MAPPED, one.what, one.element, one.where) for one in unmapped)
     checked = check_model(source, words, overrides or ())
     checked = replace(checked, findings=(*notes, *checked.findings))
     if format_ == "text":
@@ -62,7 +62,7 @@ def check(output: Output, model: Model, overrides: Overrides = None, format_: Fo
 
 
 @commands.add("json")
-def rules(output: Output) -> int:
+def rules(output: CommandOutput) -> int:
     """List the rules that a model is checked against."""
     from volery.model.rules import RULES
 
@@ -79,7 +79,7 @@ def rules(output: Output) -> int:
     return OK
 
 
-def _show(output: Output, checked: CheckedModel) -> None:
+def _show(output: CommandOutput, checked: CheckedModel) -> None:
     for one in checked.findings:
         if one.rule.level == "error":
             output.complain(f"volery: {_line(one)}")
@@ -87,7 +87,9 @@ def _show(output: Output, checked: CheckedModel) -> None:
     if system is not None and not checked.errors:
         output.show(_summary(system), _instances(system), *_hovers(system), *_readiness(checked.missing))
     said = [
-        Text(f"⚠ {_line(one)}", style="yellow") for one in checked.findings if one.rule.level == "warning"
+        Text(f"⚠ {_line(finding)}", style="yellow")
+        for finding in checked.findings
+        if finding.rule.level == "warning"
     ]
     said += [
         Text(f"· suppressed: {_line(one)} ({reason})", style="dim") for one, reason in checked.suppressed
@@ -96,7 +98,7 @@ def _show(output: Output, checked: CheckedModel) -> None:
         output.results.print(line, soft_wrap=True)  # editors read the place from its beginning
 
 
-def _line(one: Finding) -> str:
+def _line(one: BrokenRule) -> str:
     where = f"{one.where}: " if one.where is not None else ""
     return f"{where}{one} [{one.rule.code} {one.rule.name}]"
 
@@ -109,18 +111,18 @@ def _data(checked: CheckedModel) -> dict[str, Any]:
             "name": system.name,
             "allocations": list(system.allocations),
             "scenarios": list(system.scenarios),
-            "instances": {one.name: one.component.name for one in system.instances},
-            "requirements": [one.name for one in system.requirements],
+            "instances": {instance.name: instance.component.name for instance in system.instances},
+            "requirements": [requirement.name for requirement in system.requirements],
             "missing": {key: [_line(one) for one in found] for key, found in checked.missing.items()},
         }
     return {
         **described,
-        "findings": [_record(one) for one in checked.findings],
+        "findings": [_record(finding) for finding in checked.findings],
         "suppressed": [{**_record(one), "reason": reason} for one, reason in checked.suppressed],
     }
 
 
-def _record(one: Finding) -> dict[str, Any]:
+def _record(one: BrokenRule) -> dict[str, Any]:
     return {
         "code": one.rule.code,
         "rule": one.rule.name,
@@ -145,10 +147,14 @@ def _summary(system: System) -> Text:
 def _instances(system: System) -> Table:
     place = f"runs on ({system.allocation or 'nowhere'})"
     listed = make_table("instance", "component", "language", place, "connected to")
-    for one in system.instances:
-        targets = [str(target) for connection in one.connections.values() for target in connection.targets]
-        where = one.processor or "environment"
-        listed.add_row(one.name, one.component.name, one.component.language, where, ", ".join(targets))
+    for instance in system.instances:
+        targets = [
+            str(target) for connection in instance.connections.values() for target in connection.targets
+        ]
+        where = instance.processor or "environment"
+        listed.add_row(
+            instance.name, instance.component.name, instance.component.language, where, ", ".join(targets)
+        )
     for vehicle in system.vehicles:
         node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
         listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
@@ -168,16 +174,16 @@ def _hovers(system: System) -> Iterable[Table]:
         number_column("for"),
         "until the charge left is",
     )
-    for one in hovers(system):
-        figures = f"{one.mass_kg:.4g} kg", f"{one.throttle:.0%}", f"{one.watts:.0f} W"
+    for hover in hovers(system):
+        figures = f"{hover.mass_kg:.4g} kg", f"{hover.throttle:.0%}", f"{hover.watts:.0f} W"
         listed.add_row(
-            one.vehicle, one.frame, *figures, f"{one.seconds / 60.0:.1f} min", f"{one.reserve:.0%}"
+            hover.vehicle, hover.frame, *figures, f"{hover.seconds / 60.0:.1f} min", f"{hover.reserve:.0%}"
         )
     if listed.row_count:
         yield listed
 
 
-def _readiness(missing: dict[str, tuple[Finding, ...]]) -> Iterable[Text]:
+def _readiness(missing: dict[str, tuple[BrokenRule, ...]]) -> Iterable[Text]:
     for fidelity, found in missing.items():
         if not found:
             yield Text(f"✓ ready for fidelity {fidelity}", style="green")
@@ -188,7 +194,7 @@ def _readiness(missing: dict[str, tuple[Finding, ...]]) -> Iterable[Text]:
 
 
 @commands.add()
-def schema(output: Output) -> int:
+def schema(output: CommandOutput) -> int:
     """Print the JSON Schema of models, for an editor that completes and checks YAML."""
     from volery.model.document import schema as model_schema
 
@@ -197,7 +203,7 @@ def schema(output: Output) -> int:
 
 
 @commands.add("json")
-def observables(output: Output) -> int:
+def observables(output: CommandOutput) -> int:
     """List the observables that a requirement may bound."""
     from volery.model.reading import NOTE_PREFIX
     from volery.requirements.observables import NOTED, all_observables

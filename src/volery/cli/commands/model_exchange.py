@@ -10,12 +10,12 @@ import typer
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.cli.command import LEFT_OUT, OK, Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import AllowLoss, Model
 
 if TYPE_CHECKING:
     from volery.exchange.convert import ImportedLaunch
-    from volery.exchange.launch.launch_model import Computer
+    from volery.exchange.launch.launch_model import LaunchComputer
     from volery.exchange.notes import Note
     from volery.exchange.uml.uml_model import Imported
     from volery.model.reading import ProcessorKind
@@ -41,7 +41,7 @@ Search = Annotated[
 
 @commands.add("quiet", "json", "debug", name="import")
 def import_(
-    output: Output,
+    output: CommandOutput,
     source: Annotated[
         Path, typer.Argument(metavar="FILE", help="UML model with MARTE or S3D, or a launch file of ROS.")
     ],
@@ -79,7 +79,7 @@ def import_(
     ]
     output.show(f"{out}: {', '.join(counts)}")
     _notes(output, imported.notes)
-    output.give({"model": str(out), "notes": [str(one) for one in imported.notes]})
+    output.give({"model": str(out), "notes": [str(note) for note in imported.notes]})
     return _status(imported.notes, allow_loss)
 
 
@@ -93,16 +93,16 @@ def _launch_arguments(texts: Iterable[str]) -> dict[str, str]:
     return given
 
 
-def _computer(processors: Iterable[str], words: Mapping[str, ProcessorKind]) -> Computer:
+def _computer(processors: Iterable[str], words: Mapping[str, ProcessorKind]) -> LaunchComputer:
     """Return the computer of the nodes of a launch file, at its greatest frequency."""
-    from volery.exchange.launch.launch_model import COMPUTER, Computer
+    from volery.exchange.launch.launch_model import COMPUTER, LaunchComputer
 
     stated = _pairs(processors, words)
     if stated.keys() - {COMPUTER}:
         listed = ", ".join(sorted(stated.keys() - {COMPUTER}))
         raise UsageError(f"--processor {listed}: the computer of a launch file's nodes is {COMPUTER}=KIND")
     kind = stated.get(COMPUTER, _USUAL)
-    return Computer(kind, words[kind].greatest_hz, assumed=not stated)
+    return LaunchComputer(kind, words[kind].greatest_hz, assumed=not stated)
 
 
 _USUAL = "rpi4-cortex-a72"
@@ -111,15 +111,15 @@ _USUAL = "rpi4-cortex-a72"
 
 def _folders(search: Iterable[Path]) -> list[Path]:
     folders = list(search)
-    for one in folders:
-        if not one.is_dir():
-            raise UsageError(f"--search {one}: there is no such folder")
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--search {folder}: there is no such folder")
     return folders
 
 
 @commands.add("quiet", "json", "debug")
 def export(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     to: Annotated[
         Path,
@@ -141,17 +141,17 @@ def export(
     notes = export_model(model, to, vocabulary(), PackageSearch())
     output.show(f"{to} is written")
     _notes(output, notes)
-    output.give({"file": str(to), "notes": [str(one) for one in notes]})
+    output.give({"file": str(to), "notes": [str(note) for note in notes]})
     return _status(notes, allow_loss)
 
 
 def _status(notes: tuple[Note, ...], allow_loss: bool) -> int:
-    return LEFT_OUT if any(one.lost for one in notes) and not allow_loss else OK
+    return LEFT_OUT if any(note.lost for note in notes) and not allow_loss else OK
 
 
-def _notes(output: Output, notes: tuple[Note, ...]) -> None:
+def _notes(output: CommandOutput, notes: tuple[Note, ...]) -> None:
     for lost, what in ((True, "did not map"), (False, "changed or assumed")):
-        listed = [one for one in notes if one.lost is lost]
+        listed = [note for note in notes if note.lost is lost]
         if listed:
             output.note(f"{len(listed)} thing{'s' * (len(listed) > 1)} {what}:")
         for one in listed:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from volery.base.errors import UsageError, choices
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, make_table
+from volery.cli.console import CommandOutput, make_table
 from volery.cli.options import Allocation, Model, Overrides, Scenario
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _SUFFIX = {"svg": "svg", "mermaid": "mmd"}
 
 @commands.add("quiet", "debug")
 def draw(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     view: Annotated[str, typer.Option(metavar="|".join((*VIEWS, "all")), help="What is drawn.")] = "all",
     to: Annotated[
@@ -75,7 +75,7 @@ def draw(
     return OK
 
 
-def _write(output: Output, file: Path, text: str) -> None:
+def _write(output: CommandOutput, file: Path, text: str) -> None:
     from volery.base.files import write_text
 
     try:
@@ -111,7 +111,7 @@ def _mermaid_drawers() -> dict[str, Callable[[System], str]]:
 
 @commands.add("quiet", "json", "debug")
 def diff(
-    output: Output,
+    output: CommandOutput,
     before: Annotated[Path, typer.Argument(help="Model file or folder.")],
     after: Annotated[Path, typer.Argument(help="Another one, or the same with other options.")],
     allocation: Allocation = None,
@@ -150,7 +150,7 @@ def diff(
 
 @commands.add("debug")
 def show(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     allocation: Allocation = None,
     scenario: Scenario = None,

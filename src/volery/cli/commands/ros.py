@@ -15,7 +15,7 @@ from rich.text import Text
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S, clock, from_seconds, to_seconds
 from volery.cli.command import LEFT_OUT, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 from volery.cli.options import AllowLoss, NewRecording, OnGraph, Recording, Seed, Topics
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ DRAWING_PERIOD: Ns = from_seconds(0.5)
 
 
 @bag_commands.add("json", "debug")
-def info(output: Output, recording: Recording) -> int:
+def info(output: CommandOutput, recording: Recording) -> int:
     """List the topics of a recording."""
     from volery.ros.messages.bags import open_bag
 
@@ -41,7 +41,7 @@ def info(output: Output, recording: Recording) -> int:
             "start_ns": bag.start,
             "end_ns": bag.end,
             "topics": [topic._asdict() for topic in bag.topics],
-            "connections": [_described(one) for one in bag.connections],
+            "connections": [_described(connection) for connection in bag.connections],
             "unreadable": bag.unreadable,
             "omitted": bag.omitted,
         }
@@ -93,7 +93,7 @@ def _offered(connection: BagConnection) -> str:
 
 @bag_commands.add("quiet", "json", "debug")
 def play(
-    output: Output,
+    output: CommandOutput,
     recording: Recording,
     on: OnGraph = "ros1",
     rate: Annotated[float, typer.Option(help="Recorded seconds per second.")] = 1.0,
@@ -141,7 +141,7 @@ def play(
 
 @bag_commands.add("quiet", "json", "debug")
 def record(
-    output: Output,
+    output: CommandOutput,
     out: NewRecording,
     on: OnGraph = "ros1",
     topics: Topics = None,
@@ -182,7 +182,7 @@ def record(
 
 @bag_commands.add("quiet", "json", "debug")
 def convert(
-    output: Output,
+    output: CommandOutput,
     recording: Recording,
     out: NewRecording,
     topics: Topics = None,
@@ -229,7 +229,7 @@ def convert(
     return LEFT_OUT if lost and not allow_loss else OK
 
 
-def _note_reading(output: Output, bag: Bag) -> None:
+def _note_reading(output: CommandOutput, bag: Bag) -> None:
     if bag.omitted:
         output.note(bag.omission(list(bag.omitted)))
     if bag.remark:
@@ -240,21 +240,21 @@ def _note_reading(output: Output, bag: Bag) -> None:
         output.note(f"{bag.path} is truncated; only its complete part is read")
 
 
-def _note_defects(output: Output, bag: Bag) -> None:
+def _note_defects(output: CommandOutput, bag: Bag) -> None:
     _note_reading(output, bag)
     for topic, why in bag.unreadable.items():
         output.note(f"{topic} is left out: {why}")
     _note_damage(output, bag)
 
 
-def _note_damage(output: Output, bag: Bag) -> None:
+def _note_damage(output: CommandOutput, bag: Bag) -> None:
     """Report what reading the messages has found: damage, and definitions that differ from ours."""
     for what in (*bag.damage, *bag.differences):
         output.note(what)
 
 
 @contextmanager
-def _progress_bar(output: Output, total: float, words: str) -> Iterator[Callable[[float], None]]:
+def _progress_bar(output: CommandOutput, total: float, words: str) -> Iterator[Callable[[float], None]]:
     columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=output.notes, disable=not output.shows_progress) as progress:
         task = progress.add_task(words, total=total or None)
@@ -268,7 +268,7 @@ ROS_2 = 2
 
 @commands.add("quiet", "debug")
 def bridge(
-    output: Output,
+    output: CommandOutput,
     words: Annotated[
         list[str] | None,
         typer.Argument(
@@ -359,7 +359,7 @@ def bridge(
 class BridgeNotes:
     """Prints the events of a bridge, and its status when it changes."""
 
-    def __init__(self, output: Output) -> None:
+    def __init__(self, output: CommandOutput) -> None:
         self._output = output
         self._last = ""
 
@@ -381,7 +381,7 @@ class BridgeNotes:
 
 @commands.add("quiet", "json", "debug")
 def graph(
-    output: Output,
+    output: CommandOutput,
     source: Annotated[
         str, typer.Argument(metavar="ros1|ros2|FOLDER", help="A real ROS graph, or a run folder.")
     ],
@@ -458,7 +458,7 @@ def _folded(heading: str) -> Column:
 
 @commands.add("quiet", "debug")
 def messages(
-    output: Output,
+    output: CommandOutput,
     packages: Annotated[
         list[str], typer.Argument(help="Packages, such as roscopter, mavros_msgs, pprzros_msgs.")
     ],

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, make_table
+from volery.cli.console import CommandOutput, make_table
 from volery.cli.options import Allocation, Model, Overrides, Scenario
 
 commands = Commands("ros")
@@ -17,7 +17,7 @@ commands = Commands("ros")
 
 @commands.add("quiet", "json", "debug")
 def deploy(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     to: Annotated[
         Path, typer.Option(metavar="DIR", help="New or empty folder, or of an earlier deployment.")

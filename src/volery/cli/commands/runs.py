@@ -16,7 +16,7 @@ import typer
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, file_size, make_table, number_column
+from volery.cli.console import CommandOutput, file_size, make_table, number_column
 from volery.cli.options import Seed
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Listed:
 @commands.add("json", "debug", name="runs")
 @commands.add("json", "debug", name="list")
 def list_runs(
-    output: Output,
+    output: CommandOutput,
     folder: Annotated[Path, typer.Argument(help="Folder that contains run folders, at any depth.")] = RUNS,
 ) -> int:
     """List run folders with what was run, how it ended and how large they are, the newest last."""
@@ -75,13 +75,13 @@ def list_runs(
 
 @commands.add("debug")
 def remove(
-    output: Output,
+    output: CommandOutput,
     names: Annotated[list[str], typer.Argument(metavar="RUN...", help="Run folders of the list.")],
     folder: Annotated[Path, typer.Option(help="Folder that was listed.")] = RUNS,
 ) -> int:
     """Remove run folders, all or none of those that are named."""
     known = {one.folder: one for one in _runs_in(folder)}
-    for name in (chosen := [_known_name(one, folder, known) for one in names]):
+    for name in (chosen := [_known_name(name, folder, known) for name in names]):
         if any(other.startswith(f"{name}/") for other in known):
             raise UsageError(f"{name}: it contains other runs; remove these first")
     for name in chosen:
@@ -138,7 +138,7 @@ def _listed(here: Path, folder: Path) -> Listed:
 
 
 def _autopilots(record: RunRecord) -> Counter[str]:
-    return Counter(one.autopilot for one in record.vehicles.values())
+    return Counter(vehicle.autopilot for vehicle in record.vehicles.values())
 
 
 def _name(here: Path, folder: Path) -> str:
@@ -151,7 +151,7 @@ def _written(path: Path) -> str:
 
 @commands.add("quiet", "json", "debug")
 def report(
-    output: Output,
+    output: CommandOutput,
     folder: Annotated[Path, typer.Argument(help="Run folder.")],
     notes: Annotated[
         bool, typer.Option("--notes", help="List the warnings of the run and what was not counted.")
@@ -175,7 +175,7 @@ MOST_PHASES, MOST_ROWS = 40, 12
 
 @commands.add("quiet", "json", "debug")
 def compare(
-    output: Output,
+    output: CommandOutput,
     records: Annotated[
         list[str] | None,
         typer.Argument(
@@ -275,7 +275,7 @@ def _check_mission(given: Sequence[str], addresses: Sequence[str]) -> None:
         raise UsageError(f"there is no file {given[0]!r}; {expected}")
 
 
-def _fly(output: Output, mission: Path, address: str, seed: int) -> Path:
+def _fly(output: CommandOutput, mission: Path, address: str, seed: int) -> Path:
     """Fly a mission into a new run folder and return it; how it ends is part of the comparison."""
     from volery.cli.run_display import recorded_folder, run_progress
     from volery.run.fly import fly
@@ -303,7 +303,7 @@ def _shown(compared: Comparison) -> Iterator[RenderableType]:
 
     yield from map(GridTable, compared.run_grids)
     flights = compared.all_flights
-    if sum(len(one.phases) for one in flights) <= MOST_PHASES:
+    if sum(len(flight.phases) for flight in flights) <= MOST_PHASES:
         for one in flights:
             yield GridTable(phase_grid(one))
             for grid in filter(None, (answer_grid(one), text_grid(one))):
@@ -319,7 +319,7 @@ def _as_json(found: Recovered) -> str:
     return found.record.model_dump_json(by_alias=True, indent=2)
 
 
-def _note_report(output: Output, found: Recovered) -> None:
+def _note_report(output: CommandOutput, found: Recovered) -> None:
     output.note(f"report: {found.report}")
     if found.lost:
         output.note(f"  {found.lost}")

@@ -11,7 +11,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import (
     Allocation,
     Fidelity,
@@ -32,7 +32,7 @@ commands = Commands()
 
 @commands.add("quiet", "json", "debug")
 def simulate(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     fidelity: Fidelity = "code",
     allocation: Allocation = None,

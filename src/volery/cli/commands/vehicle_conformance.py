@@ -14,7 +14,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table
+from volery.cli.console import CommandOutput, make_table
 from volery.cli.options import Seed
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ commands = Commands("vehicle")
 
 @commands.add("quiet", "json", "debug")
 def conformance(
-    output: Output,
+    output: CommandOutput,
     url: Annotated[
         str,
         typer.Argument(
@@ -103,15 +103,15 @@ def _write(folder: Path | None, report: Report) -> None:
     part.replace(folder / "conformance.json")
 
 
-def _list_checks(output: Output, checks: Sequence[Check]) -> None:
+def _list_checks(output: CommandOutput, checks: Sequence[Check]) -> None:
     listed = make_table("group", "check", "flies", "demands")
     for one in checks:
         listed.add_row(one.group, one.name, "yes" if one.flies else "", one.demands)
     output.show(listed)
     output.give(
         [
-            {"check": one.name, "group": one.group, "flies": one.flies, "demands": one.demands}
-            for one in checks
+            {"check": check.name, "group": check.group, "flies": check.flies, "demands": check.demands}
+            for check in checks
         ]
     )
 
@@ -122,12 +122,14 @@ def _result_table(report: Report) -> Table:
     styles = {Outcome.PASSED: "green", Outcome.FAILED: "bold red"}
     shown = make_table(Column("check", no_wrap=True), Column("result", overflow="fold"))
     group = ""
-    for one in report.results:
-        if one.group != group:
-            shown.add_row(Text(one.group, style="dim"))
-        group = one.group
-        said = Text(one.outcome.value, style=styles.get(one.outcome, "dim"))
-        shown.add_row(f"  {one.check}", said.append(f": {one.detail}" if one.detail else "", style="default"))
+    for result in report.results:
+        if result.group != group:
+            shown.add_row(Text(result.group, style="dim"))
+        group = result.group
+        said = Text(result.outcome.value, style=styles.get(result.outcome, "dim"))
+        shown.add_row(
+            f"  {result.check}", said.append(f": {result.detail}" if result.detail else "", style="default")
+        )
     return shown
 
 
@@ -136,15 +138,15 @@ def _summary(report: Report) -> Text:
     from volery.testing.driver_conformance import Outcome
 
     counts = dict.fromkeys(Outcome, 0)
-    for one in report.results:
-        counts[one.outcome] += 1
+    for result in report.results:
+        counts[result.outcome] += 1
     parts = [f"{count} {outcome.value}" for outcome, count in counts.items() if count]
     style = "bold green" if report.conforms else "bold red"
     return Text(f"{report.url}: {', '.join(parts)}", style=style)
 
 
 @contextmanager
-def _progress(output: Output, checks: int) -> Iterator[Show]:
+def _progress(output: CommandOutput, checks: int) -> Iterator[Show]:
     """Show the check in progress on a terminal; elsewhere print a line for each that has ended."""
     from volery.testing.driver_conformance import Outcome
 

@@ -16,13 +16,13 @@ from rich.text import Text
 
 from volery.base.errors import NotArrived, UsageError, choices
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import CommandOutput, make_table, number_column
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from volery.vehicles import Vehicle
-    from volery.vehicles.parameters import Difference, Parameters
+    from volery.vehicles.parameters import ParameterDifference, Parameters
 
 parameters = Commands("vehicle params", "Read and write the parameters of an autopilot.")
 missions = Commands("vehicle mission", "Upload and download missions, geofences, rally points.")
@@ -61,7 +61,7 @@ def _attached(url: str, kind: str) -> Iterator[Vehicle]:
 
 @parameters.add("quiet", "json", "debug", name="get")
 def get(
-    output: Output,
+    output: CommandOutput,
     url: Url,
     names: Annotated[list[str] | None, typer.Argument(metavar="NAME...", help="By default all.")] = None,
     kind: Kind = "drone",
@@ -79,7 +79,7 @@ def get(
 
 @parameters.add("quiet", "debug", name="set")
 def set_one(
-    output: Output,
+    output: CommandOutput,
     url: Url,
     name: Annotated[str, typer.Argument(metavar="NAME")],
     value: Annotated[float, typer.Argument(metavar="VALUE")],
@@ -94,7 +94,7 @@ def set_one(
 
 
 @parameters.add("quiet", "debug", name="save")
-def save(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+def save(output: CommandOutput, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
     """Write all parameters into a file."""
     with _attached(url, kind) as vehicle:
         count = vehicle.parameters.save(file)
@@ -103,7 +103,7 @@ def save(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 
 
 @parameters.add("quiet", "json", "debug", name="load")
-def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+def load(output: CommandOutput, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
     """Set the parameters of a file that differ from the vehicle's, but for those that it writes itself."""
     with _attached(url, kind) as vehicle:
         own = vehicle.parameters
@@ -114,7 +114,7 @@ def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 
 
 @parameters.add("quiet", "json", "debug", name="diff")
-def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+def diff(output: CommandOutput, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
     """Compare a vehicle with a file. Exit status: 0 if no setting of the file differs, else 1.
 
     Values that the autopilot writes itself, such as counters, are no settings: those that differ are named.
@@ -126,7 +126,9 @@ def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
     return FAILED if found else OK
 
 
-def _show(output: Output, found: Sequence[Difference], own: Parameters, here: str, there: str) -> None:
+def _show(
+    output: CommandOutput, found: Sequence[ParameterDifference], own: Parameters, here: str, there: str
+) -> None:
     converted = own.converted
     if found:
         table = make_table("parameter", number_column(here), number_column(there))
@@ -143,7 +145,7 @@ def _show(output: Output, found: Sequence[Difference], own: Parameters, here: st
 
 
 @missions.add("quiet", "debug", name="upload")
-def upload(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
+def upload(output: CommandOutput, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
     """Replace mission, geofence and rally points on board by those of a plan; an empty part clears."""
     from volery.vehicles.vehicle_plan import Plan
 
@@ -158,7 +160,7 @@ def upload(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Ki
 
 
 @missions.add("quiet", "debug", name="download")
-def download(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
+def download(output: CommandOutput, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
     """Write mission, geofence and rally points on board into a plan."""
     with _attached(url, kind) as vehicle:
         with suppress(NotArrived):  # home is part of the file
@@ -184,7 +186,7 @@ def _count(plan: object) -> str:
 
 @commands.add("quiet", "json", "debug")
 def logs(
-    output: Output,
+    output: CommandOutput,
     url: Url,
     get: Annotated[int | None, typer.Option(metavar="NUMBER", help="Download this log.")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to download into.")] = None,
@@ -194,9 +196,9 @@ def logs(
     with _attached(url, kind) as vehicle:
         entries = vehicle.logs.list()
         if get is not None:
-            entry = next((one for one in entries if one.number == get), None)
+            entry = next((entry for entry in entries if entry.number == get), None)
             if entry is None:
-                numbers = choices(str(one.number) for one in entries)
+                numbers = choices(str(entry.number) for entry in entries)
                 raise UsageError(f"--get {get}: there is no such log; there is {numbers}")
             suffix = ".ulg" if vehicle.telemetry.autopilot == "PX4" else ".bin"
             path = vehicle.logs.download(entry, out or Path(f"log-{get}{suffix}"))
@@ -210,13 +212,13 @@ def logs(
         output.show(table)
     else:
         output.note("there are no logs on board")
-    output.give([one._asdict() for one in entries])
+    output.give([entry._asdict() for entry in entries])
     return OK
 
 
 @commands.add("quiet", "json", "debug")
 def files(
-    output: Output,
+    output: CommandOutput,
     url: Url,
     path: Annotated[str, typer.Argument(metavar="PATH", help="Folder to list, or file to download.")] = "/",
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Download PATH into this file.")] = None,
@@ -238,5 +240,5 @@ def files(
         output.show(table)
     else:
         output.note(f"{path} is empty")
-    output.give([one._asdict() for one in entries])
+    output.give([entry._asdict() for entry in entries])
     return OK

@@ -10,7 +10,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import Seed
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ commands = Commands("vehicle")
 
 @commands.add("quiet", "debug")
 def serve(
-    output: Output,
+    output: CommandOutput,
     autopilot: Annotated[str, typer.Argument(help="Autopilot to simulate.")] = "ardupilot",
     listen: Annotated[
         str | None,

@@ -10,7 +10,7 @@ from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.base.time import from_seconds
 from volery.cli.command import Commands
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.options import (
     Allocation,
     LogFile,
@@ -30,7 +30,7 @@ commands = Commands("vehicle")
 
 @commands.add("quiet", "debug")
 def world(
-    output: Output,
+    output: CommandOutput,
     model: Model,
     json: Annotated[
         str,

@@ -118,7 +118,8 @@ def operation(interface: str, signature: Signature) -> CppOperation:
     """
     where = f"interfaces.{interface}.{signature.name}"
     arguments = tuple(
-        (one.name, cpp_type(one.type, f"{where}.args.{one.name}")) for one in signature.arguments
+        (argument.name, cpp_type(argument.type, f"{where}.args.{argument.name}"))
+        for argument in signature.arguments
     )
     return CppOperation(signature.name, arguments, cpp_type(signature.returns, f"{where}.returns"))
 
@@ -129,7 +130,7 @@ def operations(interface: Interface) -> tuple[CppOperation, ...]:
 
 
 @dataclass(frozen=True)
-class RequiredPort:
+class CppPort:
     """A required port: its name, its interface, and whether it may be connected to several components."""
 
     port: str
@@ -150,11 +151,11 @@ class RequiredPort:
 def interfaces_header(interfaces: Iterable[Interface]) -> str:
     """Return the text of ``interfaces.h``."""
     lines = ["// Generated from the model: its interfaces.", "#pragma once", '#include "volery/types.h"', ""]
-    for one in interfaces:
-        lines.append(f"class {one.name} {{")
+    for interface in interfaces:
+        lines.append(f"class {interface.name} {{")
         lines.append("public:")
-        lines.append(f"    virtual ~{one.name}() = default;")
-        lines += [f"    virtual {found.declaration} = 0;" for found in operations(one)]
+        lines.append(f"    virtual ~{interface.name}() = default;")
+        lines += [f"    virtual {found.declaration} = 0;" for found in operations(interface)]
         lines += ["};", ""]
     return "\n".join(lines)
 
@@ -162,12 +163,12 @@ def interfaces_header(interfaces: Iterable[Interface]) -> str:
 def glue(
     class_name: str,
     file: Path,
-    requires: Sequence[RequiredPort],
+    requires: Sequence[CppPort],
     provided: Sequence[CppOperation],
     interfaces: Mapping[str, Interface],
 ) -> str:
     """Return the text that makes ``class_name``, defined in ``file``, a component."""
-    used = dict.fromkeys(one.interface for one in requires if one.interface != DRONE)
+    used = dict.fromkeys(require.interface for require in requires if require.interface != DRONE)
     lines = ["// Generated: connects the component's class to the framework ABI.", f'#include "{file}"', ""]
     lines += ['#include "volery/glue.h"', f'#include "{HEADER}"', "", "namespace {"]
     for name in used:
@@ -194,13 +195,13 @@ def _port_class(interface: Interface) -> list[str]:
     return [*lines, "};", ""]
 
 
-def _construction(class_name: str, requires: Sequence[RequiredPort]) -> list[str]:
+def _construction(class_name: str, requires: Sequence[CppPort]) -> list[str]:
     ports = []
     for one in requires:
         implementation = one.cpp_class if one.interface == DRONE else f"{one.interface}_port"
         template = "many" if one.many else "one"
         ports.append(f'volery::{template}<{one.cpp_class}, {implementation}>("{one.port}")')
-    parameters = "".join(f", {one.parameter}" for one in requires)
+    parameters = "".join(f", {require.parameter}" for require in requires)
     return [
         "volery::register_callable_as(volery::MAKE, [](volery::Reader, volery::Writer&) {",
         f"    volery::check_constructor<{class_name}{parameters}>();",
@@ -259,7 +260,7 @@ class CppComponent:
     path: Path
     class_name: str = ""
     provided: tuple[CppOperation, ...] = ()
-    requires: tuple[RequiredPort, ...] = ()
+    requires: tuple[CppPort, ...] = ()
     interfaces: Mapping[str, Interface] | None = None
     flags: tuple[str, ...] = ()
     libraries: tuple[str, ...] = ()
@@ -268,7 +269,7 @@ class CppComponent:
 
 
 @dataclass(frozen=True)
-class ClientLibrary:
+class LibraryHeaders:
     """Headers of a client library.
 
     ``include`` folders are searched before the system's, ``fallback`` folders after them. ``generate`` makes
@@ -295,7 +296,7 @@ class CompiledComponent:
 
 def compile_component(
     component: CppComponent,
-    client_library: ClientLibrary = ClientLibrary(),
+    client_library: LibraryHeaders = LibraryHeaders(),
     report_progress: ReportProgress | None = None,
     compiled_by: CompileSources = compile_each,
 ) -> CompiledComponent:
@@ -346,7 +347,7 @@ def _of_the_class(component: CppComponent, sources: Sources, error: ModelError) 
         return error
     where = sources.place_of_class(component.class_name) or component.where
     missing = _NO_MEMBER.search(error.what)
-    name = next((one for one in missing.groups() if one), "") if missing else ""
+    name = next((group for group in missing.groups() if group), "") if missing else ""
     if name in [one.name for one in component.provided]:
         what = f"has no member function {name!r}, an operation that it provides"
     else:
@@ -382,18 +383,18 @@ def _runtime_object(name: str) -> Path:
     return CppToolchain("volery").object_file(RUNTIME / name, INCLUDE)
 
 
-def _generated_headers(component: CppComponent, client_library: ClientLibrary, sources: Sources) -> Path:
+def _generated_headers(component: CppComponent, client_library: LibraryHeaders, sources: Sources) -> Path:
     """Return a folder with the interface and message headers of a component, named by their content.
 
     Only interfaces that the component provides or requires are generated: others may use types that have no
     counterpart in C++.
     """
     provided = {one.name for one in component.provided}
-    required = {one.interface for one in component.requires}
+    required = {require.interface for require in component.requires}
     used = [
-        one
-        for one in (component.interfaces or {}).values()
-        if one.name in required or provided & one.operations.keys()
+        interface
+        for interface in (component.interfaces or {}).values()
+        if interface.name in required or provided & interface.operations.keys()
     ]
     texts = {HEADER: interfaces_header(used)}
     texts.update(client_library.generate(sources.included, component.path, sources.found))
@@ -415,7 +416,7 @@ def _translation_units(component: CppComponent, sources: Sources) -> list[Path]:
     return [_write_generated({name: text}) / name, *(one for one in sources.compiled if one != file)]
 
 
-def _main(component: CppComponent, client_library: ClientLibrary, sources: Sources) -> Iterator[Path]:
+def _main(component: CppComponent, client_library: LibraryHeaders, sources: Sources) -> Iterator[Path]:
     """Yield the file with the ``main`` that the client library provides, if any."""
     try:
         text = client_library.main_of(sources, component.node_class)

@@ -189,19 +189,19 @@ def _port_handlers(name: str, ports: Mapping[str, ConnectedPort]) -> dict[str, R
 
 def _drone(name: str, ports: Mapping[str, ConnectedPort], port: str, index: int) -> Drone:
     """Return the drone at a port; with an empty ``port``, the only drone of the component."""
-    drones = [one for one in ports.values() if not one.operations]
+    drones = [port for port in ports.values() if not port.operations]
     if port:
-        found = ports[port].targets[index]
+        target = ports[port].targets[index]
     elif len(drones) == 1 and len(drones[0].targets) == 1:
-        found = drones[0].targets[0]
+        target = drones[0].targets[0]
     else:
         count = sum(len(one.targets) for one in drones)
         raise UsageError(
             f"{name}: uc_drone_...() is for a component that commands one drone, but it is connected to "
             f"{count}: require one port of the interface Drone, or take I_RosDron& in the constructor"
         )
-    assert isinstance(found, Drone)
-    return found
+    assert isinstance(target, Drone)
+    return target
 
 
 def _go(drone: Drone, arguments: Reader) -> None:
@@ -301,7 +301,7 @@ class CppProgram:
     def make(self, given: Mapping[str, Any]) -> CppObject:
         """See ``Program``: load the library and construct the object."""
         component = self._compiled.component
-        ports = {one.port for one in component.requires}
+        ports = {require.port for require in component.requires}
         parameters = {name: value for name, value in given.items() if name not in ports}
         handlers = request_handlers(self._kernel, self._name, parameters, self._connected(given))
         runtime = framework_runtime(self._compiled.framework)
@@ -322,7 +322,7 @@ class CppProgram:
         found = {}
         for port in component.requires:
             interface = (component.interfaces or {}).get(port.interface)
-            known = {one.name: one for one in operations(interface)} if interface else {}
+            known = {operation.name: operation for operation in operations(interface)} if interface else {}
             connected = given.get(port.port, ())
             targets = list(connected) if isinstance(connected, (PortList, list)) else [connected]
             found[port.port] = ConnectedPort(known, targets)

@@ -59,8 +59,8 @@ class Sources:
     def place_of_class(self, name: str) -> Location | None:
         """Return file and line of the definition of a class, or None."""
         file = self.file_of_class(name)
-        found = _definition(name).search(_text(file)) if file is not None else None
-        return Location(str(file), _text(file).count("\n", 0, found.start()) + 1) if file and found else None
+        match = _definition(name).search(_text(file)) if file is not None else None
+        return Location(str(file), _text(file).count("\n", 0, match.start()) + 1) if file and match else None
 
 
 def _definition(name: str) -> re.Pattern[str]:
@@ -156,10 +156,10 @@ class _Targets(NamedTuple):
 
 
 def _targets(package: Package) -> _Targets:
-    found = _Targets({}, {}, {})
+    targets = _Targets({}, {}, {})
     lists = package.folder / "CMakeLists.txt"
     if not lists.is_file():
-        return found
+        return targets
     text = re.sub(r"#[^\n]*", "", _text(lists))
     project = _PROJECT.search(text)
     name = project.group(1) if project else ""
@@ -168,10 +168,10 @@ def _targets(package: Package) -> _Targets:
     for _ in range(2):  # a variable may be of another one
         text = re.sub(r"\$\{(\w+)\}", lambda one: known.get(one[1], one[0]), text)
     for command, words in _TARGET.findall(text):
-        kinds = {"add_executable": found.executables, "add_library": found.libraries}
+        kinds = {"add_executable": targets.executables, "add_library": targets.libraries}
         target, *rest = words.replace('"', " ").split() or [""]
-        kinds.get(command.lower(), found.links).setdefault(target, []).extend(rest)
-    return found
+        kinds.get(command.lower(), targets.links).setdefault(target, []).extend(rest)
+    return targets
 
 
 def executables(package: Package) -> dict[str, Path]:

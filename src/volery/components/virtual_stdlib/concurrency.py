@@ -165,7 +165,7 @@ class ThreadPoolExecutor(KernelBound):
     ) -> Iterator[Any]:
         """Execute calls with the elements of iterables; return an iterator over the results, in order."""
         futures = [self.submit(fn, *given) for given in zip(*iterables, strict=False)]
-        return (one.result(timeout) for one in futures)
+        return (future.result(timeout) for future in futures)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Take no more calls; wait for the end of those that were taken."""
@@ -197,7 +197,9 @@ def _ended(futures: list[Future], enough: Callable[[int], object], timeout: floa
     for one in futures:
         one.add_done_callback(lambda _: changed.notify())
     return changed.wait_for(
-        lambda: enough(sum(one.done() for one in futures)), longest_wait(True, timeout), ends_activation=True
+        lambda: enough(sum(future.done() for future in futures)),
+        longest_wait(True, timeout),
+        ends_activation=True,
     )
 
 
@@ -227,7 +229,7 @@ def wait(
         return return_when == concurrent.futures.FIRST_COMPLETED or any(map(failed, futures))
 
     _ended(futures, lambda done: done > 0 and enough(done), timeout)
-    done = {one for one in futures if one.done()}
+    done = {future for future in futures if future.done()}
     return done, set(futures) - done
 
 
@@ -311,15 +313,15 @@ class EventLoop(asyncio.BaseEventLoop):
     ) -> asyncio.Future[Any]:
         """Call *func* in a thread, or by a pool."""
         pool = executor or bind(self._kernel, (ThreadPoolExecutor,))["ThreadPoolExecutor"](1)
-        made = self.create_future()
+        future = self.create_future()
 
         def finish(error: BaseException | None, result: Any) -> None:
-            if made.done():
+            if future.done():
                 return
             if error is None:
-                made.set_result(result)
+                future.set_result(result)
             else:
-                made.set_exception(error)
+                future.set_exception(error)
 
         def ended(one: Any) -> None:
             self.call_soon_threadsafe(finish, one._error, one._result)
@@ -327,7 +329,7 @@ class EventLoop(asyncio.BaseEventLoop):
         pool.submit(func, *args).add_done_callback(ended)
         if executor is None:
             pool.shutdown(wait=False)
-        return made
+        return future
 
     async def shutdown_default_executor(self, timeout: float | None = None) -> None:
         """Do nothing: each call had a thread of its own."""

@@ -172,8 +172,8 @@ class ProcessModules:
         above = name.rpartition(".")[0]
         if above.rpartition(".")[2] in ("msg", "srv", "action"):
             return self._import_module(above)
-        found: ModuleType | None = self.sys.modules.get(name) or real_inspect.getmodule(object, _filename)
-        return found
+        module: ModuleType | None = self.sys.modules.get(name) or real_inspect.getmodule(object, _filename)
+        return module
 
     def _os(self) -> ModuleType:
         environment = dict(real_os.environ)

@@ -62,7 +62,7 @@ def _flows(kernel: Kernel) -> list[Task]:
     instance = component_of(task)
     if instance is None or instance.scope is None:
         return [task]
-    return [one for one in instance.scope.all_tasks() if one.own.component == instance.name]
+    return [task for task in instance.scope.all_tasks() if task.own.component == instance.name]
 
 
 class Thread(KernelBound):

@@ -24,7 +24,7 @@ from volery.cost.native.block_costs import (
 from volery.cost.native.compilation import (
     METHOD,
     CompilerError,
-    Program,
+    OptimisedCode,
     compile_program,
     llvm_toolchain,
     run_tool,
@@ -45,7 +45,7 @@ __all__ = [
     "CompilerError",
     "Instrumented",
     "Invocation",
-    "Program",
+    "OptimisedCode",
     "ProgramEstimate",
     "SourceLineCost",
     "block_steps",

@@ -23,7 +23,7 @@ import numpy as np
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model
 from volery.cost.native.build_cache import cached_path, keep_file
-from volery.cost.native.compilation import Program, compile_program
+from volery.cost.native.compilation import OptimisedCode, compile_program
 from volery.cost.native.instruction_tables import InstructionTables, instruction_tables
 from volery.cost.native.instrumented_run import ADDRESS, AHEAD, LEVEL, NUMBER, POSITION, BlockTrace
 from volery.cost.native.llvm_ir import access_blocks
@@ -34,16 +34,18 @@ from volery.cost.pricing import STEPS_PER_CYCLE
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def access_numbers(program: Program) -> Array:
+def access_numbers(program: OptimisedCode) -> Array:
     """Return the number of the access of each row of the table of instructions; -1 for none."""
     first: dict[str, int] = {}
     for number, block in enumerate(access_blocks(program.text)):
         first.setdefault(program.blocks[block].function, number)
     return np.array(
         [
-            first[block.function] + one.access - 1 if one.access and block.function in first else -1
+            first[block.function] + instruction.access - 1
+            if instruction.access and block.function in first
+            else -1
             for block in program.machine_blocks
-            for one in block.instructions
+            for instruction in block.instructions
         ],
         dtype=np.int64,
     )
@@ -144,7 +146,7 @@ def block_steps(cycles: Array, memory: Array, frequency_mhz: float, charged: Arr
     return steps
 
 
-def static_costs(program: Program) -> BlockCosts:
+def static_costs(program: OptimisedCode) -> BlockCosts:
     """Estimate costs from the code alone: each block runs several times in a row, without mispredictions."""
     code = MachineCode(program.blocks, program.machine_blocks)
     tables = instruction_tables(program.machine_blocks, program.law, program.defined)
@@ -159,7 +161,7 @@ def static_costs(program: Program) -> BlockCosts:
     return BlockCosts(cycles, instructions, none, none > 0.0)
 
 
-def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, ExecutedPath, float]:
+def traced_costs(program: OptimisedCode, trace: BlockTrace) -> tuple[BlockCosts, ExecutedPath, float]:
     """Return costs from a trace: the mean of each block that was entered, the others from the code alone.
 
     Beside them are the path and the share of the cycles that was lost to mispredicted branches.
@@ -272,7 +274,7 @@ def blocks_of(code: MachineCode, first: int) -> list[int]:
 
 
 def load_costs(key: str) -> BlockCosts | None:
-    """Return the costs kept under a ``Program.key``, or None."""
+    """Return the costs kept under an ``OptimisedCode.key``, or None."""
     try:
         with np.load(cached_path(_name(key))) as kept:
             return BlockCosts(kept["cycles"], kept["instructions"], kept["memory"], kept["seen"])
@@ -281,7 +283,7 @@ def load_costs(key: str) -> BlockCosts | None:
 
 
 def save_costs(key: str, costs: BlockCosts) -> None:
-    """Keep costs under a ``Program.key``; do nothing where the cache cannot be written."""
+    """Keep costs under an ``OptimisedCode.key``; do nothing where the cache cannot be written."""
     with TemporaryDirectory(prefix="volery-native-") as folder:
         new = Path(folder, _name(key))
         np.savez(new, **asdict(costs))

@@ -94,7 +94,7 @@ def overlay_options(source: Path, isa: str, folder: Path, dependencies: Dependen
     options: list[str] = []
     for _ in range(_MOST_PASSES):
         options = _overlay(sorted(known), isa, folder)
-        found = {_absolute(one) for one in rule_dependencies(dependencies(options))}
+        found = {_absolute(dependency) for dependency in rule_dependencies(dependencies(options))}
         if found <= known:
             break
         known |= found
@@ -138,10 +138,10 @@ def _foreign(text: str) -> Iterator[str]:
     for line in text.splitlines():
         if define := _DEFINE.match(line):
             function = define[1]
-        if found := _ASSEMBLY.search(line):
-            yield f"{_place(text, line)}: inline assembly {found[1]!r}"
-        elif found := _INTRINSIC.search(line):
-            yield _call_of_intrinsic(text, line, function, found[1])
+        if match := _ASSEMBLY.search(line):
+            yield f"{_place(text, line)}: inline assembly {match[1]!r}"
+        elif match := _INTRINSIC.search(line):
+            yield _call_of_intrinsic(text, line, function, match[1])
 
 
 def _call_of_intrinsic(text: str, line: str, function: str, name: str) -> str:
@@ -176,8 +176,8 @@ def _place(text: str, line: str) -> str:
 
 def _field(body: str, name: str) -> str:
     """Return the value of a field of debug information."""
-    found = re.search(_FIELD.format(name), body)
-    return (found[1] or found[2] or found[3] or "") if found else ""
+    match = re.search(_FIELD.format(name), body)
+    return (match[1] or match[2] or match[3] or "") if match else ""
 
 
 def _plain_name(symbol: str) -> str:
@@ -210,7 +210,7 @@ class LlvmToolchain:
     def versions(self) -> tuple[str, ...]:
         """What changes with another version of the programs."""
         paths = [Path(one) for one in (self.clang, self.opt, self.llc, self.link)]
-        return tuple(f"{one} {one.stat().st_mtime_ns} {one.stat().st_size}" for one in paths)
+        return tuple(f"{path} {path.stat().st_mtime_ns} {path.stat().st_size}" for path in paths)
 
 
 @cache
@@ -287,7 +287,7 @@ LANGUAGES = {".c", ".cc", ".cpp", ".cxx", ".C"}
 
 
 @dataclass(frozen=True)
-class Program:
+class OptimisedCode:
     """Code optimised for a core: LLVM's intermediate code and its basic blocks, whose order numbers them."""
 
     text: str
@@ -352,7 +352,7 @@ def generator_options(isa: str) -> tuple[str, ...]:
     return ("-O2", "-relocation-model=pic", "-disable-cgp-select2branch", *moves)
 
 
-def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] = ()) -> Program:
+def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] = ()) -> OptimisedCode:
     """Compile C and C++ sources and optimise them for a core.
 
     Args:
@@ -371,7 +371,7 @@ def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] 
             raise UsageError(f"{source}: not a C or C++ file ({', '.join(sorted(LANGUAGES))})")
     with TemporaryDirectory(prefix="volery-native-") as scratch:
         text = _optimised(sources, law, flags, Path(scratch))
-    return Program(text, law, tuple(basic_blocks(text)))
+    return OptimisedCode(text, law, tuple(basic_blocks(text)))
 
 
 def _optimised(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str], scratch: Path) -> str:

@@ -125,8 +125,8 @@ def instruction_tables(
         capacity,
         core,
         history_lengths(law.tables, law.history),
-        np.array([one.latency for one in law.memory.caches] if law.memory else [0.0]),
-        np.array([one.entries for one in law.queues], dtype=np.int64),
+        np.array([cache.latency for cache in law.memory.caches] if law.memory else [0.0]),
+        np.array([queue.entries for queue in law.queues], dtype=np.int64),
     )
 
 
@@ -147,7 +147,7 @@ def _row(effect: Effect, known: dict[str, int], places: dict[str, int]) -> list[
         return OPERATION_CLASSES.index(name) if name else -1
 
     def numbers(registers: tuple[str, ...], columns: int) -> list[int]:
-        found = [known.setdefault(one, len(known)) for one in dict.fromkeys(registers)][:columns]
+        found = [known.setdefault(fromkey, len(known)) for fromkey in dict.fromkeys(registers)][:columns]
         return found + [-1] * (columns - len(found))
 
     memory = effect.memory

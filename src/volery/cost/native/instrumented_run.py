@@ -21,7 +21,7 @@ import numpy as np
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.cost.code_laws import MemoryLaw
 from volery.cost.native.build_cache import cached_file, digest
-from volery.cost.native.compilation import Program, llvm_toolchain, run_tool
+from volery.cost.native.compilation import OptimisedCode, llvm_toolchain, run_tool
 
 _SWITCHED, _ACCESSED = 1 << 31, 1 << 30
 
@@ -170,7 +170,7 @@ __attribute__((constructor(101))) static void start(int count, char **arguments)
 """
 
 
-def driver(program: Program, invocation: Invocation) -> str:
+def driver(program: OptimisedCode, invocation: Invocation) -> str:
     """Return the C text that makes the calls between ``volery_begin`` and ``volery_end``."""
     declared = {"": _BEGINNING}
     calls = [
@@ -191,7 +191,7 @@ def driver(program: Program, invocation: Invocation) -> str:
     )
 
 
-def timing_driver(program: Program, invocation: Invocation) -> str:
+def timing_driver(program: OptimisedCode, invocation: Invocation) -> str:
     """Return the C text before ``timing.c``: the activation, and the calls that prepare it."""
     if not invocation.entry:
         raise UsageError("only a function can be timed repeatedly: state one as the entry")
@@ -201,7 +201,9 @@ def timing_driver(program: Program, invocation: Invocation) -> str:
     return "".join(declared.values()) + f"#define PREPARE() {before}\n#define ACTIVATE() {activation}\n"
 
 
-def build_executable(program: Program, invocation: Invocation, instrumented: Path, folder: Path) -> Path:
+def build_executable(
+    program: OptimisedCode, invocation: Invocation, instrumented: Path, folder: Path
+) -> Path:
     """Link an instrumented object with its driver and the runtime.
 
     Returns:
@@ -242,13 +244,13 @@ def runtime_objects(folder: Path) -> list[Path]:
         return [compiled(source) for source in sources]
 
 
-def _link_options(program: Program, invocation: Invocation) -> tuple[str, ...]:
+def _link_options(program: OptimisedCode, invocation: Invocation) -> tuple[str, ...]:
     """Return the linker's options; the driver's ``main`` takes precedence over the program's."""
     first = ("-Wl,-z,muldefs",) if invocation.entry and "main" in program.defined else ()
     return (*first, *invocation.links, "-lm")
 
 
-def build_timing(program: Program, invocation: Invocation, code: Path, folder: Path) -> Path:
+def build_timing(program: OptimisedCode, invocation: Invocation, code: Path, folder: Path) -> Path:
     """Link an object with ``timing.c``; the executable takes the number of activations as its argument."""
     source = folder / "timing.c"
     timing = files("volery.cost.native").joinpath("runtime/timing.c").read_text(encoding="utf-8")
@@ -299,7 +301,7 @@ def trace_blocks(
 
 def cache_settings(memory: MemoryLaw | None) -> str:
     """Return the setting of ``caches.c``: bytes and ways of each cache."""
-    return ",".join(f"{one.bytes}/{one.ways}" for one in memory.caches) if memory else ""
+    return ",".join(f"{cache.bytes}/{cache.ways}" for cache in memory.caches) if memory else ""
 
 
 def _run(executable: Path, invocation: Invocation, settings: dict[str, str]) -> None:
@@ -320,14 +322,14 @@ def _run(executable: Path, invocation: Invocation, settings: dict[str, str]) -> 
         raise UsageError(f"the program ended with {done.returncode} before anything was counted: {output}")
 
 
-def _call(program: Program, text: str, declared: dict[str, str]) -> str:
+def _call(program: OptimisedCode, text: str, declared: dict[str, str]) -> str:
     """Return the C call of a function by its C++ name and add its declaration to ``declared``."""
     parsed = _CALL.match(text)
     if parsed is None:
         raise UsageError(f"{text!r} is not a call such as step or step(3, 0.5)")
     name, arguments = parsed[1], parsed[2] or ""
     symbol, returned, parameters = _function(program, name)
-    given = [one.strip() for one in arguments.split(",")] if arguments.strip() else []
+    given = [word.strip() for word in arguments.split(",")] if arguments.strip() else []
     if len(given) != len(parameters):
         raise UsageError(
             f"{name} takes {len(parameters)} arguments, not {len(given)}: {name}({', '.join(parameters)})"
@@ -339,11 +341,11 @@ def _call(program: Program, text: str, declared: dict[str, str]) -> str:
     return f"f_{name}({', '.join(given)})"
 
 
-def _function(program: Program, name: str) -> tuple[str, str, list[str]]:
+def _function(program: OptimisedCode, name: str) -> tuple[str, str, list[str]]:
     """Return the symbol of a function, its result type and its parameter types in C."""
     callable_here: dict[str, tuple[str, str, list[str]]] = {}
     for returned, symbol, parameters in _DEFINE.findall(program.text):
-        took = [_C_TYPES.get(one.split()[0], "") for one in parameters.split(",") if one.strip()]
+        took = [_C_TYPES.get(word.split()[0], "") for word in parameters.split(",") if word.strip()]
         back = _C_TYPES.get(returned, "")
         if back and all(took) and not symbol.startswith("_GLOBAL_"):
             callable_here[_plain(symbol)] = (symbol, back, took)

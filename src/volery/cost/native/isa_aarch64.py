@@ -81,9 +81,9 @@ def _memory(name: str, operands: tuple[str, ...], at: int) -> MemoryOperand:
     narrow = _NARROW.match(name)
     each = _WIDTHS[narrow[1]] if narrow else _WIDTHS.get(operands[0][:1], 8)
     after = at + 1 < len(operands)
-    found = _DISPLACEMENT.search(where)
+    match = _DISPLACEMENT.search(where)
     place = "" if where.endswith("!") or after else _DISPLACEMENT.sub("", where)
-    return MemoryOperand(_registers((where,)), place, int(found[1]) if found else 0, each * at)
+    return MemoryOperand(_registers((where,)), place, int(match[1]) if match else 0, each * at)
 
 
 def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
@@ -104,7 +104,7 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
 def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
     """Return the class of the operation and their number: a packed quotient has as many as parts."""
     first = operands[0] if operands else ""
-    integer = [one[:1] in "wx" for one in operands if _REGISTER.fullmatch(one) or "." in one]
+    integer = [operand[:1] in "wx" for operand in operands if _REGISTER.fullmatch(operand) or "." in operand]
     if any(integer) and not all(integer):
         return "transfer", 1
     if all(integer):
@@ -138,8 +138,8 @@ def _integer_class(name: str, operands: tuple[str, ...]) -> str:
 
 def _registers(operands: tuple[str, ...]) -> tuple[str, ...]:
     found = []
-    for one in operands:
-        for register in _REGISTER.finditer(one):
+    for operand in operands:
+        for register in _REGISTER.finditer(operand):
             if register[5]:
                 found.append("sp")
             elif register[1] and register[2] != "zr":

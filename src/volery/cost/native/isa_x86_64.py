@@ -139,7 +139,7 @@ def _move(name: str, operands: tuple[str, ...]) -> Effect:
 
 
 def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
-    place = next((one for one in operands if "[" in one), "")
+    place = next((operand for operand in operands if "[" in operand), "")
     operation, times = _operation(name, operands)
     writes = () if _COMPARES.match(name) else _register_operands(operands[:1])
     if name == "lea":
@@ -151,7 +151,7 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
     if not _KEEPS_FLAGS.match(name) or name.startswith(("ucomi", "comi")):
         writes = (*writes, FLAGS)
     stores = bool(place) and operands[0] == place and not _COMPARES.match(name)
-    vector = any("mm" in one for one in operands)
+    vector = any("mm" in operand for operand in operands)
     return Effect(
         slots=2.0 if stores or operation in ("convert", "convert_integer") else 1.0,
         load=("load_vector" if vector else "load") if place and not name.startswith("set") else "",
@@ -176,7 +176,7 @@ def _operation(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
     for pattern, operation in _NAMED:
         if pattern.match(name):
             return operation, 1
-    if any(_REGISTERS.get(one, "").startswith("xmm") for one in operands):
+    if any(_REGISTERS.get(operand, "").startswith("xmm") for operand in operands):
         return "vector", 1
     return _integer_class(name, operands)
 
@@ -196,22 +196,24 @@ def _integer_class(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
 
 
 def _registers(operands: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(_REGISTERS[word] for one in operands for word in _WORD.findall(one) if word in _REGISTERS)
+    return tuple(
+        _REGISTERS[word] for operand in operands for word in _WORD.findall(operand) if word in _REGISTERS
+    )
 
 
 def _register_operands(operands: tuple[str, ...]) -> tuple[str, ...]:
     """Return the registers that are operands themselves, not parts of an address."""
-    return _registers(tuple(one for one in operands if "[" not in one))
+    return _registers(tuple(operand for operand in operands if "[" not in operand))
 
 
 def _memory(operand: str) -> MemoryOperand:
     if "[" not in operand:
         return NO_MEMORY
     place = operand[operand.index("[") :]
-    found = _DISPLACEMENT.search(place)
+    match = _DISPLACEMENT.search(place)
     return MemoryOperand(
         _registers((operand,)),
         _DISPLACEMENT.sub("", place),
-        int(found[1] + found[2]) if found else 0,
+        int(match[1] + match[2]) if match else 0,
         _SIZES.get(operand.partition(" ")[0], 8),
     )

@@ -72,7 +72,7 @@ def with_access_calls(lines: Iterable[str]) -> Iterator[str]:
 
 def _address(line: str) -> str:
     """Return the address of an access: the last operand that is a pointer."""
-    pointers = [one for one in split_operands(line.strip()) if one.startswith("ptr ")]
+    pointers = [operand for operand in split_operands(line.strip()) if operand.startswith("ptr ")]
     return _value(pointers[-1].removeprefix("ptr "))
 
 

@@ -78,8 +78,8 @@ class SwitchResolver:
         if id(block) in self._passed:
             return None
         self._passed.add(id(block))
-        for one in block.instructions:
-            self._execute(one)
+        for instruction in block.instructions:
+            self._execute(instruction)
         return self._decide(block.instructions[-1]) if block.instructions else None
 
     def _execute(self, one: Instruction) -> None:
@@ -137,21 +137,21 @@ class SwitchResolver:
 
 
 def _register(operand: str) -> _Register | None:
-    found = _REGISTER.match(operand)
-    if found is None:
+    match = _REGISTER.match(operand)
+    if match is None:
         return None
-    if found[1]:
-        return _Register(found[2], _BITS[found[1]])
-    if found[3]:
-        return _Register(f"r{found[4]}", _BITS["r" + found[5]])
-    if found[7]:
-        return _Register(found[7], _BITS[found[6]])
-    return _Register(f"{found[8]}x" if found[8] else found[9], 8)
+    if match[1]:
+        return _Register(match[2], _BITS[match[1]])
+    if match[3]:
+        return _Register(f"r{match[4]}", _BITS["r" + match[5]])
+    if match[7]:
+        return _Register(match[7], _BITS[match[6]])
+    return _Register(f"{match[8]}x" if match[8] else match[9], 8)
 
 
 def _amount(operand: str) -> int | None:
-    found = _AMOUNT.match(operand)
-    return int(found[1]) if found else None
+    match = _AMOUNT.match(operand)
+    return int(match[1]) if match else None
 
 
 def _sum(name: str, operands: tuple[str, ...]) -> tuple[str | None, int]:
@@ -247,7 +247,9 @@ class MachineCode:
                     candidates.setdefault(block, []).append(number)
         chosen: dict[int, int] = {}
         for block, numbers in candidates.items():
-            entered = [one for one in numbers if self._is_entered(one, predecessors.get(one, set()))]
+            entered = [
+                number for number in numbers if self._is_entered(number, predecessors.get(number, set()))
+            ]
             chosen.update(dict.fromkeys(entered or numbers[:1], block))
         return chosen
 
@@ -255,7 +257,7 @@ class MachineCode:
         """Return whether a machine block is entered from another basic block."""
         came_from = self.machine_blocks[number].came_from
         return not predecessors or any(
-            self.machine_blocks[one].came_from != came_from for one in predecessors
+            self.machine_blocks[predecessor].came_from != came_from for predecessor in predecessors
         )
 
     def _is_labelled(self, number: int) -> bool:
@@ -413,7 +415,7 @@ class _PathSearch:
         if depth <= 0:
             return _LOST
         foreign = block is not None and block != self.owner
-        onward = min(self._search(one, ahead, depth - len(successors) ** 2) for one in successors)
+        onward = min(self._search(successor, ahead, depth - len(successors) ** 2) for successor in successors)
         return min(_LOST, onward + (_FOREIGN if foreign else 1))
 
 

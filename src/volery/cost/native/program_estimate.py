@@ -13,7 +13,7 @@ import numpy as np
 from volery.cost.code_laws import TimeBand, time_band
 from volery.cost.native.block_costs import BlockCosts, blocks_of, save_costs, traced_costs
 from volery.cost.native.build_cache import cached_file
-from volery.cost.native.compilation import Program
+from volery.cost.native.compilation import OptimisedCode
 from volery.cost.native.instrumented_run import (
     WINDOW,
     Invocation,
@@ -71,7 +71,7 @@ class ProgramEstimate:
         return self.cycles / (mhz * 1e6) + self.memory_ns * 1e-9
 
 
-def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimate:
+def estimate_program(program: OptimisedCode, invocation: Invocation) -> ProgramEstimate:
     """Count and trace one run; keep the costs for the same code on the same core."""
     with TemporaryDirectory(prefix="volery-native-") as made:
         folder = Path(made)
@@ -101,7 +101,7 @@ def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimat
     )
 
 
-def library_calls(program: Program, counts: Array) -> Counter[str]:
+def library_calls(program: OptimisedCode, counts: Array) -> Counter[str]:
     """Return the number of calls of each library function."""
     code = MachineCode(program.blocks, program.machine_blocks)
     calls: Counter[str] = Counter()
@@ -113,7 +113,7 @@ def library_calls(program: Program, counts: Array) -> Counter[str]:
     return calls
 
 
-def costs_by_line(program: Program, costs: BlockCosts, counts: Array) -> tuple[SourceLineCost, ...]:
+def costs_by_line(program: OptimisedCode, costs: BlockCosts, counts: Array) -> tuple[SourceLineCost, ...]:
     """Return the cost of each source line, the greatest first.
 
     A block's cycles are spread evenly over its instructions. The cost of an edge between blocks, mostly
@@ -126,9 +126,9 @@ def costs_by_line(program: Program, costs: BlockCosts, counts: Array) -> tuple[S
         if not counts[block]:
             continue
         lines = [
-            one.source
+            instruction.source
             for number in blocks_of(code, first)
-            for one in program.machine_blocks[number].instructions
+            for instruction in program.machine_blocks[number].instructions
         ]
         for line in lines:
             cycles[line] += costs.cycles[block] * float(counts[block]) / len(lines)
@@ -153,7 +153,7 @@ def _last_line(code: MachineCode, block: int) -> str:
 
 
 def _left_out(
-    program: Program, costs: BlockCosts, counts: Array, calls: Counter[str], lost: float
+    program: OptimisedCode, costs: BlockCosts, counts: Array, calls: Counter[str], lost: float
 ) -> tuple[str, ...]:
     found = [] if program.law.memory else ["every access to memory is taken to hit the first cache"]
     law = program.law.library

@@ -1,7 +1,7 @@
 """Expressions of launch files, evaluated over their syntax tree: no code is executed.
 
 ``$(eval ...)``, ``PythonExpression`` and Python launch files share the operators and the methods of texts,
-lists and mappings. What is not known stays ``Unknown`` with a reason, in whatever is made of it.
+lists and mappings. What is not known stays ``UnknownValue`` with a reason, in whatever is made of it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MOST_STEPS = 200_000
 """Most expressions and statements that are evaluated for one file: loops end."""
 
 
-class Unknown:
+class UnknownValue:
     """A value that is not known without executing something; *why* says so."""
 
     def __init__(self, why: str) -> None:
@@ -126,17 +126,17 @@ class Evaluator:
         self.steps = 0
 
     def value(self, node: ast.expr) -> Any:
-        """Return the value of an expression; an ``Unknown`` if it has none here."""
+        """Return the value of an expression; an ``UnknownValue`` if it has none here."""
         self.step()
         evaluate = getattr(self, f"_{type(node).__name__.lower()}", None)
         if evaluate is None:
-            return Unknown(f"`{ast.unparse(node)}` is not evaluated")
+            return UnknownValue(f"`{ast.unparse(node)}` is not evaluated")
         try:
             return evaluate(node)
         except UnresolvedError as error:
-            return Unknown(str(error))
+            return UnknownValue(str(error))
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            return Unknown(f"`{_short(node)}`: {error}")
+            return UnknownValue(f"`{_short(node)}`: {error}")
 
     def step(self) -> None:
         """Count an expression or a statement. Raises ``UnresolvedError`` if there are too many."""
@@ -149,7 +149,7 @@ class Evaluator:
 
     def _name(self, node: ast.Name) -> Any:
         if node.id not in self.names:
-            return Unknown(f"{node.id!r} is not known")
+            return UnknownValue(f"{node.id!r} is not known")
         return self.names[node.id]
 
     def _list(self, node: ast.List) -> Any:
@@ -179,13 +179,13 @@ class Evaluator:
 
     def _formattedvalue(self, node: ast.FormattedValue) -> Any:
         value = self.value(node.value)
-        if isinstance(value, Unknown) or node.format_spec is None:
+        if isinstance(value, UnknownValue) or node.format_spec is None:
             return value
         return _formatted("{:" + str(self.value(node.format_spec)) + "}", value)
 
     def joined(self, parts: list[Any]) -> Any:
         """Return the parts of a formatted text as one text."""
-        unknown = next((each for each in parts if isinstance(each, Unknown)), None)
+        unknown = next((each for each in parts if isinstance(each, UnknownValue)), None)
         return unknown or "".join(map(str, parts))
 
     def _binop(self, node: ast.BinOp) -> Any:
@@ -194,26 +194,32 @@ class Evaluator:
     def combined(self, kind: type, left: Any, right: Any) -> Any:
         """Return the result of a binary operator."""
         for each in (left, right):
-            if isinstance(each, Unknown):
+            if isinstance(each, UnknownValue):
                 return each
         if isinstance(left, PurePath) and kind is ast.Div:
             return left / str(right)
         if kind not in _BINARY:
-            return Unknown(f"the operator {kind.__name__} is not evaluated")
+            return UnknownValue(f"the operator {kind.__name__} is not evaluated")
         made = _too_great(kind, left, right) or _BINARY[kind](left, right)
         too_long = isinstance(made, str | list | tuple) and len(made) > LONGEST
-        return Unknown("a text or a list that is too long") if too_long else made
+        return UnknownValue("a text or a list that is too long") if too_long else made
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
         value = self.value(node.operand)
         apply = _UNARY.get(type(node.op))
-        return value if isinstance(value, Unknown) else apply(value) if apply else Unknown("an operator")
+        return (
+            value
+            if isinstance(value, UnknownValue)
+            else apply(value)
+            if apply
+            else UnknownValue("an operator")
+        )
 
     def _boolop(self, node: ast.BoolOp) -> Any:
         value: Any = None
         for each in node.values:
             value = self.value(each)
-            if isinstance(value, Unknown) or bool(value) is isinstance(node.op, ast.Or):
+            if isinstance(value, UnknownValue) or bool(value) is isinstance(node.op, ast.Or):
                 break
         return value
 
@@ -222,7 +228,7 @@ class Evaluator:
         for kind, each in zip(node.ops, node.comparators, strict=True):
             right = self.value(each)
             for value in (left, right):
-                if isinstance(value, Unknown):
+                if isinstance(value, UnknownValue):
                     return value
             if not _COMPARED[type(kind)](left, right):
                 return False
@@ -231,12 +237,12 @@ class Evaluator:
 
     def _ifexp(self, node: ast.IfExp) -> Any:
         test = self.value(node.test)
-        return test if isinstance(test, Unknown) else self.value(node.body if test else node.orelse)
+        return test if isinstance(test, UnknownValue) else self.value(node.body if test else node.orelse)
 
     def _subscript(self, node: ast.Subscript) -> Any:
         value, key = self.value(node.value), self.value(node.slice)
         for each in (value, key):
-            if isinstance(each, Unknown):
+            if isinstance(each, UnknownValue):
                 return each
         return value[key]
 
@@ -259,7 +265,7 @@ class Evaluator:
             return [make()]
         first, *rest = generators
         values = self.value(first.iter)
-        if isinstance(values, Unknown):
+        if isinstance(values, UnknownValue):
             raise UnresolvedError(values.why)
         made: list[Any] = []
         for each in list(values):
@@ -274,12 +280,12 @@ class Evaluator:
             self.names[target.id] = value
         elif isinstance(target, ast.Tuple | ast.List):
             known = isinstance(value, list | tuple) and len(value) == len(target.elts)
-            values = value if known else [Unknown("it is not known")] * len(target.elts)
+            values = value if known else [UnknownValue("it is not known")] * len(target.elts)
             for each, part in zip(target.elts, values, strict=True):
                 self.assign(each, part)
         elif isinstance(target, ast.Subscript):
             owner, key = self.value(target.value), self.value(target.slice)
-            if isinstance(owner, dict | list) and not isinstance(key, Unknown):
+            if isinstance(owner, dict | list) and not isinstance(key, UnknownValue):
                 owner[key] = value
 
     def _attribute(self, node: ast.Attribute) -> Any:
@@ -292,9 +298,9 @@ class Evaluator:
         for kind, methods in _METHODS.items():
             if isinstance(owner, kind) and name in methods:
                 return _BOUNDED.get(name, getattr)(owner, name)
-        if isinstance(owner, Unknown):
+        if isinstance(owner, UnknownValue):
             return owner
-        return Unknown(f"`.{name}` is not evaluated")
+        return UnknownValue(f"`.{name}` is not evaluated")
 
     def _call(self, node: ast.Call) -> Any:
         function = self.value(node.func)
@@ -310,28 +316,28 @@ class Evaluator:
 
     def call(self, function: Any, arguments: list[Any], named: dict[str, Any], node: ast.Call) -> Any:
         """Return the result of a call to a value that ``value`` returned."""
-        if isinstance(function, Unknown):
+        if isinstance(function, UnknownValue):
             return function
         if not callable(function):
-            return Unknown(f"`{_short(node)}` is not evaluated")
+            return UnknownValue(f"`{_short(node)}` is not evaluated")
         stored = isinstance(getattr(function, "__self__", None), list | dict)
         for each in () if stored else (*arguments, *named.values()):
-            if isinstance(each, Unknown):
+            if isinstance(each, UnknownValue):
                 return each
         return function(*arguments, **named)
 
 
-def _too_great(kind: type, left: Any, right: Any) -> Unknown | None:
+def _too_great(kind: type, left: Any, right: Any) -> UnknownValue | None:
     """Return why an operation is refused whose result would be too great, or None."""
     numbers = isinstance(left, int | float) and isinstance(right, int | float)
     if kind is ast.Pow and not (numbers and abs(right) <= GREATEST_POWER and abs(left) <= LONGEST):
-        return Unknown("a power that is too great")
+        return UnknownValue("a power that is too great")
     if kind is ast.Mult and not numbers and _size(left) * _size(right) > LONGEST:
-        return Unknown("a text or a list that is too long")
+        return UnknownValue("a text or a list that is too long")
     if kind is ast.Mod and isinstance(left, str) and _WIDE.search(left):
-        return Unknown("a text that is too long")
+        return UnknownValue("a text that is too long")
     if kind is ast.Mult and numbers and max(abs(left), abs(right)) > GREATEST:
-        return Unknown("a number that is too great")
+        return UnknownValue("a number that is too great")
     return None
 
 
@@ -360,7 +366,7 @@ _WIDE = re.compile(r"\d{4}|[*{]\s*\{|%\*")
 
 
 def _holds(value: Any) -> bool:
-    if isinstance(value, Unknown):
+    if isinstance(value, UnknownValue):
         raise UnresolvedError(value.why)
     return bool(value)
 
@@ -385,6 +391,6 @@ def evaluated(text: str, names: Mapping[str, Any]) -> Any:
         value = Evaluator({**MATHEMATICS, **names}).value(tree.body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise UnresolvedError(f"the expression {text.strip()!r} cannot be evaluated: {error}") from None
-    if isinstance(value, Unknown):
+    if isinstance(value, UnknownValue):
         raise UnresolvedError(f"the expression {text.strip()!r}: {value.why}")
     return value

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from volery.base.errors import Location, ModelError
 from volery.exchange.identifiers import identifier
 from volery.exchange.launch.launch_reading import LaunchedNode, LaunchReading, Packages, UnresolvedError
-from volery.exchange.launch.ros2_actions import Scope
+from volery.exchange.launch.ros2_actions import LaunchScope
 from volery.exchange.launch.ros2_markup import read_markup, xml_entity, yaml_entity
 from volery.exchange.launch.ros2_python import PythonLaunch
 from volery.exchange.launch.roslaunch import Ros1Reader, read_xml
@@ -53,7 +53,7 @@ def read_launch(source: Path, given: Mapping[str, str], packages: Packages) -> L
             if _is_of_ros1(root, source):
                 Ros1Reader(reading).read(root, source)
                 return reading
-        scope = Scope(reading, source, _read_ros2, dict(given))
+        scope = LaunchScope(reading, source, _read_ros2, dict(given))
         _read_ros2(source, scope, where)
     except UnresolvedError as error:
         raise ModelError(str(error), "", where) from None
@@ -66,15 +66,15 @@ def _is_of_ros1(root: Any, source: Path) -> bool:
     """Return whether a launch file in XML is one of ROS 1, by what only one of both has."""
     texts = [str(value) for element in root.iter("*") for value in element.attrib.values()]
     if (
-        any("$(var " in one or "$(find-pkg" in one for one in texts)
+        any("$(var " in text or "$(find-pkg" in text for text in texts)
         or root.find(".//node[@exec]") is not None
     ):
         return False
-    old = any("$(find " in one for one in texts) or root.find(".//node[@type]") is not None
+    old = any("$(find " in text for text in texts) or root.find(".//node[@type]") is not None
     return old or not source.name.endswith((".launch.xml", "_launch.xml"))
 
 
-def _read_ros2(file: Path, scope: Scope, where: Location) -> None:
+def _read_ros2(file: Path, scope: LaunchScope, where: Location) -> None:
     """Visit a launch file of ROS 2 in the scope of the one that includes it."""
     if not scope.reading.enter(file, where, scope.environment | scope.arguments):
         return
@@ -94,7 +94,7 @@ def _read_ros2(file: Path, scope: Scope, where: Location) -> None:
 # -- the model
 
 
-class Computer(NamedTuple):
+class LaunchComputer(NamedTuple):
     """The computer that the nodes run on: its kind in the catalogue, and its frequency, Hz."""
 
     kind: str
@@ -102,7 +102,9 @@ class Computer(NamedTuple):
     assumed: bool = False
 
 
-def launch_tree(reading: LaunchReading, source: Path, folder: Path, computer: Computer) -> dict[str, Any]:
+def launch_tree(
+    reading: LaunchReading, source: Path, folder: Path, computer: LaunchComputer
+) -> dict[str, Any]:
     """Return the model of what was read.
 
     Args:
@@ -145,7 +147,7 @@ class _Tree:
             else:
                 self._instance(self._of_the_run(node))
         if not self._instances and not self._vehicles:
-            notes = "".join(f"\n  {one}" for one in self._reading.notes)
+            notes = "".join(f"\n  {note}" for note in self._reading.notes)
             what = f"nothing in it is a node that is started{notes and ':' + notes}"
             raise ModelError(what, "", Location(str(self._source), 1))
         name = re.sub(r"\.launch$", "", PurePath(self._source.name).stem)
@@ -263,7 +265,7 @@ class _Tree:
         below = node.namespace if node.ros == 2 else f"{node.namespace}/{node.name}"
         parts = [part for part in below.split("/") if part]
         name = _free(identifier("_".join(parts)) or "mavros", self._vehicles)
-        ardupilot = any(_ARDUPILOT.search(one) for one in node.files)
+        ardupilot = any(_ARDUPILOT.search(file) for file in node.files)
         autopilot = "ardupilot" if ardupilot else "px4"
         self._vehicles[name] = {"kind": "multirotor", "autopilot": autopilot, "at": "home"}
         what = (

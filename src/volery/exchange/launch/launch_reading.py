@@ -27,7 +27,7 @@ class UnresolvedError(Exception):
     """A value of a launch file is not known without executing something, or does not exist."""
 
 
-class Program(NamedTuple):
+class ProgramSource(NamedTuple):
     """The source of a program: its file, its language, and the function that an entry point calls or ""."""
 
     file: Path
@@ -41,7 +41,7 @@ class Packages(Protocol):
     def folder(self, package: str, near: Path) -> Path | None:
         """Return the folder of a package as the file *near* sees it, or None."""
 
-    def program(self, package: str, executable: str, near: Path, ros: int) -> Program | None:
+    def program(self, package: str, executable: str, near: Path, ros: int) -> ProgramSource | None:
         """Return the source of a program of a package for a version of ROS, or None."""
 
     def package_of(self, file: Path) -> tuple[str, Path] | None:
@@ -118,7 +118,7 @@ class LaunchReading:
         """The notes; the same words for several lines are one note."""
         listed = []
         for (what, lost), (first, *others) in ((key, list(places)) for key, places in self._notes.items()):
-            also = ", ".join(_short(one, first) for one in others[:3])
+            also = ", ".join(_short(other, first) for other in others[:3])
             more = f" and {len(others) - 3} more" if len(others) > 3 else ""
             listed.append(Note(f"{what} (also {also}{more})" if others else what, first, "", lost))
         return tuple(listed)

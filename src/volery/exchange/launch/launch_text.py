@@ -106,11 +106,11 @@ def _listed(value: Any) -> list[Any]:
 def _vehicles(tree: Mapping[str, Any], ros: int) -> Iterator[_Node]:
     """Yield a node of MAVROS for each vehicle; its address is stated where it is started."""
     for name in (tree.get("environment") or {}).get("vehicles") or {}:
-        parameters = {"fcu_url": _Argument(f"{name}_url")}
+        parameters = {"fcu_url": _ArgumentName(f"{name}_url")}
         yield _Node("mavros", "mavros_node", name, "" if ros == 1 else name, parameters)
 
 
-class _Argument(str):
+class _ArgumentName(str):
     """The name of an argument whose value a parameter is."""
 
     __slots__ = ()
@@ -120,8 +120,8 @@ FCU_URL = "udp://:14540@"
 """Address of an autopilot where the one who starts the launch file states no other."""
 
 
-def _arguments(nodes: Iterable[_Node]) -> list[_Argument]:
-    return [value for one in nodes for value in one.parameters.values() if isinstance(value, _Argument)]
+def _arguments(nodes: Iterable[_Node]) -> list[_ArgumentName]:
+    return [value for node in nodes for value in node.parameters.values() if isinstance(value, _ArgumentName)]
 
 
 # -- ROS 1
@@ -149,7 +149,7 @@ def _ending(node: _Node) -> dict[str, str]:
 
 
 def _parameter_1(name: str, value: Any, unmapped: Unmapped) -> str:
-    if isinstance(value, _Argument):
+    if isinstance(value, _ArgumentName):
         return _element("param", {"name": name, "value": f"$(arg {value})"})
     if "$(" in str(value):
         unmapped.add("values with `$(`, which roslaunch would replace", name)
@@ -183,7 +183,7 @@ def _ending_2(node: _Node, unmapped: Unmapped) -> dict[str, str]:
 
 
 def _parameter_2(name: str, value: Any, unmapped: Unmapped) -> str:
-    if isinstance(value, _Argument):
+    if isinstance(value, _ArgumentName):
         return _element("param", {"name": name, "value": f"$(var {value})"})
     if isinstance(value, Mapping):
         inner = "".join(_parameter_2(key, below, unmapped) for key, below in value.items())
@@ -206,7 +206,7 @@ def _python(nodes: list[_Node]) -> str:
             "namespace": repr(node.namespace),
             "parameters": f"[{{{parameters}}}]",
             "remappings": repr([(str(key), str(one)) for key, one in node.remaps.items()]),
-            "arguments": repr([str(one) for one in node.arguments]),
+            "arguments": repr([str(argument) for argument in node.arguments]),
         }
         empty = ("''", "[]", "[{}]")
         stated = ", ".join(f"{key}={one}" for key, one in words.items() if one not in empty)
@@ -217,7 +217,7 @@ def _python(nodes: list[_Node]) -> str:
 
 
 def _python_value(value: Any) -> str:
-    return f"LaunchConfiguration({str(value)!r})" if isinstance(value, _Argument) else repr(_plain(value))
+    return f"LaunchConfiguration({str(value)!r})" if isinstance(value, _ArgumentName) else repr(_plain(value))
 
 
 def _plain(value: Any) -> Any:
@@ -245,7 +245,10 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _command_line(arguments: Iterable[str]) -> str:
-    return " ".join(one if one and not set(one) & set(" '\"\\") else json.dumps(one) for one in arguments)
+    return " ".join(
+        argument if argument and not set(argument) & set(" '\"\\") else json.dumps(argument)
+        for argument in arguments
+    )
 
 
 def _element(tag: str, attributes: Mapping[str, str], *, keep: bool = False) -> str:

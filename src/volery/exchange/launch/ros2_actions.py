@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.base.errors import Location
-from volery.exchange.launch.expressions import Unknown
+from volery.exchange.launch.expressions import UnknownValue
 from volery.exchange.launch.launch_reading import (
     LaunchedNode,
     LaunchReading,
@@ -31,7 +31,7 @@ PARAMETERS = "ros__parameters"
 
 
 @dataclass
-class Scope:
+class LaunchScope:
     """What holds while actions are visited: arguments, namespace, remappings and parameters of all nodes.
 
     ``read`` includes another launch file: it is given the file and this scope.
@@ -39,7 +39,7 @@ class Scope:
 
     reading: LaunchReading
     file: Path
-    read: Callable[[Path, Scope, Location], None]
+    read: Callable[[Path, LaunchScope, Location], None]
     arguments: dict[str, str] = field(default_factory=dict)
     namespace: str = "/"
     remaps: dict[str, str] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Scope:
     environment: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, str] = field(default_factory=dict)
 
-    def inner(self) -> Scope:
+    def inner(self) -> LaunchScope:
         """Return the scope of a group."""
         return replace(
             self,
@@ -68,16 +68,16 @@ class Scope:
 class Substitution:
     """A text that is known when an action is visited; ``typed`` one keeps the type of its result."""
 
-    resolve: Callable[[Scope], Any]
+    resolve: Callable[[LaunchScope], Any]
     name: str = ""
 
 
 def _must_be_known(value: Any) -> None:
-    if isinstance(value, Unknown | NotMapped):
-        raise UnresolvedError(value.why if isinstance(value, Unknown) else value.what)
+    if isinstance(value, UnknownValue | NotMapped):
+        raise UnresolvedError(value.why if isinstance(value, UnknownValue) else value.what)
 
 
-def resolved(value: Any, scope: Scope) -> Any:
+def resolved(value: Any, scope: LaunchScope) -> Any:
     """Return a value with all substitutions in it replaced. Raises ``UnresolvedError``."""
     _must_be_known(value)
     if isinstance(value, Substitution):
@@ -89,7 +89,7 @@ def resolved(value: Any, scope: Scope) -> Any:
     return value
 
 
-def text(value: Any, scope: Scope) -> str:
+def text(value: Any, scope: LaunchScope) -> str:
     """Return the text of a value: a list of texts and substitutions is joined. Raises ``UnresolvedError``."""
     if isinstance(value, list | tuple):
         return "".join(text(each, scope) for each in value)
@@ -104,7 +104,7 @@ def text(value: Any, scope: Scope) -> str:
 def argument(name: Any, default: Any = None) -> Substitution:
     """Return the value of an argument (``LaunchConfiguration``, ``$(var ...)``)."""
 
-    def resolve(scope: Scope) -> Any:
+    def resolve(scope: LaunchScope) -> Any:
         key = text(name, scope)
         if key in scope.arguments:
             return scope.arguments[key]
@@ -124,7 +124,7 @@ def path_join(parts: Iterable[Any]) -> Substitution:
     """Return parts joined as a path."""
     listed = list(parts)
 
-    def resolve(scope: Scope) -> str:
+    def resolve(scope: LaunchScope) -> str:
         return str(Path(*(text(each, scope) for each in listed)))
 
     return Substitution(resolve)
@@ -133,7 +133,7 @@ def path_join(parts: Iterable[Any]) -> Substitution:
 def environment(name: Any, default: Any = None) -> Substitution:
     """Return an environment variable."""
 
-    def resolve(scope: Scope) -> str:
+    def resolve(scope: LaunchScope) -> str:
         key = text(name, scope)
         if key in scope.environment:
             return scope.environment[key]
@@ -145,7 +145,7 @@ def environment(name: Any, default: Any = None) -> Substitution:
 def anonymous(name: Any) -> Substitution:
     """Return a name with a number in place of a random one, so that a file gives one model."""
 
-    def resolve(scope: Scope) -> str:
+    def resolve(scope: LaunchScope) -> str:
         key = text(name, scope)
         return scope.numbers.setdefault(key, f"{key}_{len(scope.numbers) + 1}")
 
@@ -160,7 +160,7 @@ def file_content(path: Any) -> Substitution:
 def unresolved(why: str) -> Substitution:
     """Return a substitution that is not known."""
 
-    def resolve(scope: Scope) -> str:
+    def resolve(scope: LaunchScope) -> str:
         raise UnresolvedError(why)
 
     return Substitution(resolve)
@@ -178,11 +178,11 @@ class Action:
 
     noun = "an action"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """Do what the action does to the nodes and to *scope*. Raises ``UnresolvedError``."""
 
 
-def visit_all(actions: Iterable[Any], scope: Scope) -> None:
+def visit_all(actions: Iterable[Any], scope: LaunchScope) -> None:
     """Visit actions in order; what is not known of one is noted, and the others go on."""
     for action in actions:
         if isinstance(action, list | tuple):
@@ -214,7 +214,7 @@ class NotMapped(Action):
     what: str = ""
     lost: bool = True
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.reading.note(self.what, self.where, lost=self.lost)
 
@@ -228,7 +228,7 @@ class Declare(Action):
 
     noun = "the declaration of an argument"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         name = text(self.name, scope)
         outermost = len(scope.reading.open_files) == 1
@@ -251,7 +251,7 @@ class Let(Action):
 
     noun = "a value of an argument"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.arguments[text(self.name, scope)] = text(self.value, scope)
 
@@ -265,7 +265,7 @@ class SetEnvironment(Action):
 
     noun = "an environment variable"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         name = text(self.name, scope)
         scope.environment[name] = text(self.value, scope)
@@ -280,7 +280,7 @@ class PushNamespace(Action):
 
     noun = "a namespace"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.namespace = joined(scope.namespace, text(self.namespace, scope))
 
@@ -294,7 +294,7 @@ class SetRemap(Action):
 
     noun = "a remapping"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.remaps[text(self.source, scope)] = text(self.target, scope)
 
@@ -308,7 +308,7 @@ class SetParameter(Action):
 
     noun = "a parameter of all nodes"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.parameters[text(self.name, scope)] = parameter_value(self.value, scope)
 
@@ -321,13 +321,13 @@ class SetParameterFile(Action):
 
     noun = "a file of parameters"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         scope.parameter_files.append(Path(text(self.file, scope)))
 
 
 @dataclass
-class Group(Action):
+class ActionGroup(Action):
     """Actions together; what they set holds in the group only if it is *scoped*."""
 
     actions: Sequence[Any] = ()
@@ -335,7 +335,7 @@ class Group(Action):
 
     noun = "a group"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         visit_all(self.actions, scope.inner() if self.scoped else scope)
 
@@ -349,7 +349,7 @@ class Include(Action):
 
     noun = "an included launch file"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         file = Path(text(self.file, scope))
         for name, value in self.arguments:
@@ -358,7 +358,7 @@ class Include(Action):
 
 
 @dataclass
-class Node(Action):
+class LaunchNode(Action):
     """A node, a container of composable nodes, or with ``plugin`` a composable node."""
 
     package: Any = None
@@ -379,7 +379,7 @@ class Node(Action):
 
     noun = "a node"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         if self.executable is None and self.plugin is None:
             raise UnresolvedError("its executable is missing")
@@ -389,7 +389,7 @@ class Node(Action):
         words = [text(each, scope) for each in self.arguments]
         respawn = self.respawn
         delay = text(self.respawn_delay, scope)
-        made = LaunchedNode(
+        node = LaunchedNode(
             text(self.package, scope),
             text(self.executable if self.plugin is None else self.plugin, scope),
             name,
@@ -405,19 +405,21 @@ class Node(Action):
             float(delay) if re.fullmatch(r"\d+(\.\d*)?", delay) else 0.0,
             (*scope.reading.open_files, *files),
         )
-        scope.reading.nodes.append(made)
-        visit_all([replace(one, container=full) for one in self.composable if isinstance(one, Node)], scope)
+        scope.reading.nodes.append(node)
+        visit_all(
+            [replace(one, container=full) for one in self.composable if isinstance(one, LaunchNode)], scope
+        )
 
-    def _named(self, scope: Scope) -> tuple[str, str]:
+    def _named(self, scope: LaunchScope) -> tuple[str, str]:
         name = text(self.name, scope)
         own = text(self.namespace, scope)
         namespace = joined(scope.namespace, own) if own else scope.namespace
         return name, namespace
 
-    def _remaps(self, scope: Scope) -> dict[str, str]:
+    def _remaps(self, scope: LaunchScope) -> dict[str, str]:
         return {text(source, scope): text(target, scope) for source, target in map(_pair, self.remaps)}
 
-    def _parameters(self, scope: Scope, full: str, *, named: bool) -> tuple[dict[str, Any], list[str]]:
+    def _parameters(self, scope: LaunchScope, full: str, *, named: bool) -> tuple[dict[str, Any], list[str]]:
         """Return the parameters of the node, and the names of the files that they are from.
 
         A node that is not *named* here has the name that its program states, which is not known.
@@ -454,18 +456,20 @@ class LoadComposable(Action):
 
     noun = "composable nodes"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         target = self.target
-        container = text(target.name if isinstance(target, Node) else target, scope)
+        container = text(target.name if isinstance(target, LaunchNode) else target, scope)
         full = joined(scope.namespace, container)
-        visit_all([replace(one, container=full) for one in self.composable if isinstance(one, Node)], scope)
+        visit_all(
+            [replace(one, container=full) for one in self.composable if isinstance(one, LaunchNode)], scope
+        )
 
 
 def _pair(value: Any) -> tuple[Any, Any]:
     if isinstance(value, list | tuple) and len(value) == 2:
         return value[0], value[1]
-    why = value.why if isinstance(value, Unknown) else "a remapping has two names"
+    why = value.why if isinstance(value, UnknownValue) else "a remapping has two names"
     raise UnresolvedError(why)
 
 
@@ -485,7 +489,7 @@ class Typed:
     type: type | None = None
 
 
-def parameter_value(value: Any, scope: Scope) -> Any:
+def parameter_value(value: Any, scope: LaunchScope) -> Any:
     """Return the value of a parameter: a text that substitutions gave has the type that YAML reads."""
     _must_be_known(value)
     if isinstance(value, Typed):

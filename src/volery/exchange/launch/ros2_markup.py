@@ -14,9 +14,9 @@ from volery.base.errors import Location, ModelError
 from volery.exchange.launch import ros2_actions as actions
 from volery.exchange.launch.expressions import evaluated
 from volery.exchange.launch.launch_reading import UnresolvedError, file_text, truth
-from volery.exchange.launch.ros2_actions import Action, Node, NotMapped, Scope, Substitution
+from volery.exchange.launch.ros2_actions import Action, LaunchNode, LaunchScope, NotMapped, Substitution
 from volery.exchange.xml_text import Element
-from volery.model.text import Node as YamlNode
+from volery.model.text import TextNode as YamlNode
 from volery.model.text import parse as parse_yaml
 
 DEEPEST_SUBSTITUTION = 20
@@ -45,7 +45,7 @@ class Entity:
 
     def all(self, *kinds: str) -> list[Entity]:
         """Return the children of these kinds."""
-        return [one for one in self.children if one.kind in kinds]
+        return [child for child in self.children if child.kind in kinds]
 
 
 def xml_entity(element: Element, file: Path) -> Entity:
@@ -169,15 +169,17 @@ def _plain(word: list[Any]) -> Any:
     return word[0] if len(word) == 1 else word
 
 
-def _evaluated(words: list[list[Any]], scope: Scope) -> str:
-    return str(evaluated(" ".join(actions.text(one, scope) for one in words), {}))
+def _evaluated(words: list[list[Any]], scope: LaunchScope) -> str:
+    return str(evaluated(" ".join(actions.text(word, scope) for word in words), {}))
 
 
 def _all(words: list[list[Any]], combine: Callable[[Any], bool]) -> Substitution:
-    return Substitution(lambda scope: str(combine(truth(actions.text(one, scope)) for one in words)).lower())
+    return Substitution(
+        lambda scope: str(combine(truth(actions.text(word, scope)) for word in words)).lower()
+    )
 
 
-def _chosen(words: list[list[Any]], scope: Scope) -> str:
+def _chosen(words: list[list[Any]], scope: LaunchScope) -> str:
     test, *values = words
     value = values[0 if truth(actions.text(test, scope)) else 1] if len(values) > 1 else values[0]
     return actions.text(value, scope)
@@ -188,7 +190,7 @@ def _chosen(words: list[list[Any]], scope: Scope) -> str:
 
 def actions_of(entity: Entity) -> list[Action]:
     """Return the actions of the children of a file, a group or a timer."""
-    return [made for child in entity.children for made in _actions(child)]
+    return [action for child in entity.children for action in _actions(child)]
 
 
 def _actions(entity: Entity) -> Iterator[Action]:
@@ -221,15 +223,15 @@ def _made(entity: Entity) -> Iterator[Action]:
 
 def _node(entity: Entity) -> list[Action]:
     made: list[Action] = [
-        NotMapped(one.where, f"<{one.kind}> of a node is left out")
-        for one in entity.children
-        if one.kind not in ("param", "remap", "composable_node")
+        NotMapped(child.where, f"<{child.kind}> of a node is left out")
+        for child in entity.children
+        if child.kind not in ("param", "remap", "composable_node")
     ]
     composable = [_composable(one) for one in entity.all("composable_node")]
     arguments = [one for name in ("args", "ros_args") if (one := entity.get(name)) is not None]
     if "ros_args" in entity.attributes:
         arguments.insert(-1, "--ros-args")
-    node = Node(
+    node = LaunchNode(
         entity.where,
         entity.need("pkg"),
         entity.need("exec"),
@@ -246,8 +248,8 @@ def _node(entity: Entity) -> list[Action]:
     return [*made, node]
 
 
-def _composable(entity: Entity) -> Node:
-    return Node(
+def _composable(entity: Entity) -> LaunchNode:
+    return LaunchNode(
         entity.where,
         entity.need("pkg"),
         None,
@@ -301,7 +303,7 @@ def _include(entity: Entity) -> Action:
 
 def _group(entity: Entity) -> Action:
     scoped = entity.attributes.get("scoped", "true").lower() not in ("false", "0")
-    return actions.Group(entity.where, actions_of(entity), scoped)
+    return actions.ActionGroup(entity.where, actions_of(entity), scoped)
 
 
 def _ignored(what: str, *, lost: bool = True) -> Callable[[Entity], Action]:
@@ -333,7 +335,7 @@ _MAKERS: Mapping[str, Callable[[Entity], Action | list[Action]]] = {
     "unset_env": _ignored("<unset_env> is left out"),
     "timer": lambda one: [
         NotMapped(one.where, "<timer>: its nodes start with the others", lost=False),
-        actions.Group(one.where, actions_of(one), scoped=False),
+        actions.ActionGroup(one.where, actions_of(one), scoped=False),
     ],
     "log": _ignored("<log> is left out", lost=False),
     "log_info": _ignored("<log_info> is left out", lost=False),
@@ -341,7 +343,7 @@ _MAKERS: Mapping[str, Callable[[Entity], Action | list[Action]]] = {
 }
 
 
-def read_markup(entity: Entity, scope: Scope) -> None:
+def read_markup(entity: Entity, scope: LaunchScope) -> None:
     """Visit the actions of a file. Raises ``UnresolvedError`` if it is no launch file of ROS 2."""
     if entity.kind != "launch":
         raise UnresolvedError(f"its root is <{entity.kind}>, not <launch>")

@@ -16,7 +16,7 @@ from typing import Any
 
 from volery.base.errors import Location, ModelError
 from volery.exchange.launch import ros2_actions as actions
-from volery.exchange.launch.expressions import FUNCTIONS, Evaluator, Unknown, evaluated
+from volery.exchange.launch.expressions import FUNCTIONS, Evaluator, UnknownValue, evaluated
 from volery.exchange.launch.launch_reading import (
     UnresolvedError,
     environment_variable,
@@ -24,7 +24,7 @@ from volery.exchange.launch.launch_reading import (
     truth,
     yaml_value,
 )
-from volery.exchange.launch.ros2_actions import Action, Node, NotMapped, Scope, Substitution
+from volery.exchange.launch.ros2_actions import Action, LaunchNode, LaunchScope, NotMapped, Substitution
 from volery.exchange.launch.ros2_markup import OUTPUT, PREFIX
 
 ENTRY = "generate_launch_description"
@@ -61,7 +61,7 @@ class _Opened:
 
 
 @dataclass(frozen=True)
-class _Source:
+class _IncludedFile:
     """A source of an included launch file."""
 
     file: Any
@@ -82,7 +82,7 @@ def _print(*words: Any, **how: Any) -> None:
 class PythonLaunch(Evaluator):
     """Evaluates one launch file in Python within *scope*."""
 
-    def __init__(self, file: Path, scope: Scope) -> None:
+    def __init__(self, file: Path, scope: LaunchScope) -> None:
         super().__init__({"__file__": str(file), "open": self._open, "print": _print})
         self.names["Path"] = _Named("pathlib.Path")
         self._file = file
@@ -112,7 +112,7 @@ class PythonLaunch(Evaluator):
             made = self.called(entry, [], {})
         except RecursionError:
             raise UnresolvedError("it computes for too long") from None
-        if isinstance(made, Unknown):
+        if isinstance(made, UnknownValue):
             raise UnresolvedError(f"{ENTRY}: {made.why}")
         if not isinstance(made, Description):
             raise UnresolvedError(f"{ENTRY} returns no LaunchDescription that is known without executing it")
@@ -169,7 +169,7 @@ class PythonLaunch(Evaluator):
 
     def _follow_expr(self, node: ast.Expr) -> None:
         value = self.value(node.value)
-        if isinstance(value, Unknown) and isinstance(node.value, ast.Call):
+        if isinstance(value, UnknownValue) and isinstance(node.value, ast.Call):
             self._note(f"`{_short(node)}` is left out: {value.why}", node)
 
     def _follow_return(self, node: ast.Return) -> None:
@@ -177,15 +177,15 @@ class PythonLaunch(Evaluator):
 
     def _follow_if(self, node: ast.If) -> None:
         test = self.value(node.test)
-        if isinstance(test, Unknown):
+        if isinstance(test, UnknownValue):
             self._note(f"`if {_short(node.test)}` is left out with what depends on it: {test.why}", node)
         else:
             self.execute(node.body if test else node.orelse)
 
     def _follow_for(self, node: ast.For) -> None:
         values = self.value(node.iter)
-        if isinstance(values, Unknown) or not isinstance(values, list | tuple | dict | str):
-            why = values.why if isinstance(values, Unknown) else "its values are not known"
+        if isinstance(values, UnknownValue) or not isinstance(values, list | tuple | dict | str):
+            why = values.why if isinstance(values, UnknownValue) else "its values are not known"
             self._note(f"`for {_short(node.target)}` is left out: {why}", node)
             return
         for value in list(values):
@@ -245,7 +245,7 @@ class PythonLaunch(Evaluator):
     def called(self, function: _Function, arguments: list[Any], named: dict[str, Any]) -> Any:
         """Return what a function of the file returns."""
         if self._depth >= DEEPEST_CALLS:
-            return Unknown("functions call each other too deeply")
+            return UnknownValue("functions call each other too deeply")
         spec = function.node.args
         outer, self.names = self.names, dict(function.names)
         self._depth += 1
@@ -269,7 +269,7 @@ class PythonLaunch(Evaluator):
     def joined(self, parts: list[Any]) -> Any:
         """See ``Evaluator``: a text with substitutions in it is one."""
         if any(isinstance(each, Substitution) for each in parts):
-            return Unknown("a substitution within a formatted text has no value there")
+            return UnknownValue("a substitution within a formatted text has no value there")
         return super().joined(parts)
 
     def _performed(self, value: Any) -> Any:
@@ -277,7 +277,7 @@ class PythonLaunch(Evaluator):
 
     def _open(self, file: Any, *mode: Any, **how: Any) -> Any:
         if mode and "r" not in str(mode[0]):
-            return Unknown("a launch file is read without writing files")
+            return UnknownValue("a launch file is read without writing files")
         return _Opened(Path(actions.text(str(file), self.scope)))
 
     def _constructed(self, name: str, arguments: list[Any], named: dict[str, Any], node: ast.Call) -> Any:
@@ -287,14 +287,14 @@ class PythonLaunch(Evaluator):
         for table, key in ((_FUNCTIONS, name), (_FUNCTIONS, short), (_ACTIONS, short)):
             maker = table.get(key)
             if maker is not None:
-                return maker(_Call(self, where, arguments, named))
+                return maker(_PythonCall(self, where, arguments, named))
         if name.startswith(("launch.", "launch_ros.", "launch_testing", "nav2_common")):
             return NotMapped(where, f"{short} is left out")
-        return Unknown(f"`{_short(node)}` is not evaluated")
+        return UnknownValue(f"`{_short(node)}` is not evaluated")
 
 
 @dataclass
-class _Call:
+class _PythonCall:
     """A call of a class or a function: its place and its arguments."""
 
     launch: PythonLaunch
@@ -316,7 +316,7 @@ class _Call:
     def condition(self) -> Substitution | None:
         """The condition of an action."""
         stated = self.named.get("condition")
-        if isinstance(stated, Unknown):
+        if isinstance(stated, UnknownValue):
             return actions.unresolved(stated.why)
         return stated if isinstance(stated, Substitution) else None
 
@@ -333,7 +333,7 @@ def _short(node: ast.AST) -> str:
 # -- actions
 
 
-def _node(call: _Call) -> list[Action]:
+def _node(call: _PythonCall) -> list[Action]:
     made: list[Action] = []
     if call.named.get("output") is not None:
         made.append(NotMapped(call.where, OUTPUT, lost=False))
@@ -344,7 +344,7 @@ def _node(call: _Call) -> list[Action]:
             made.append(NotMapped(call.where, f"`{key}` of a node is left out"))
     ros_arguments = call.items(call.named.get("ros_arguments"))
     required = isinstance(call.named.get("on_exit"), NotMapped | list)
-    node = Node(
+    node = LaunchNode(
         call.where,
         call.get("package"),
         call.get("executable", default=call.get("node_executable")),
@@ -363,72 +363,74 @@ def _node(call: _Call) -> list[Action]:
     return [*made, node]
 
 
-def _flat_nodes(value: Any) -> list[Node]:
+def _flat_nodes(value: Any) -> list[LaunchNode]:
     """Return the composable nodes of a list; each was made with its remarks."""
     if isinstance(value, list | tuple):
-        return [one for each in value for one in _flat_nodes(each)]
-    return [value] if isinstance(value, Node) else []
+        return [node for each in value for node in _flat_nodes(each)]
+    return [value] if isinstance(value, LaunchNode) else []
 
 
-def _composable(call: _Call) -> Any:
+def _composable(call: _PythonCall) -> Any:
     return _node(call)[-1]
 
 
-def _container(call: _Call) -> list[Action]:
+def _container(call: _PythonCall) -> list[Action]:
     return _node(call)
 
 
-def _load_composable(call: _Call) -> Action:
+def _load_composable(call: _PythonCall) -> Action:
     target = call.get("target_container", 1)
     if isinstance(target, list):  # a container with its remarks
-        target = next((one for one in target if isinstance(one, Node)), target)
+        target = next((one for one in target if isinstance(one, LaunchNode)), target)
     nodes = _flat_nodes(call.get("composable_node_descriptions", 0))
     return actions.LoadComposable(call.where, target, nodes, condition=call.condition)
 
 
-def _include(call: _Call) -> Action:
+def _include(call: _PythonCall) -> Action:
     source = call.get("launch_description_source", 0)
-    file = source.file if isinstance(source, _Source) else source
+    file = source.file if isinstance(source, _IncludedFile) else source
     stated = call.get("launch_arguments", default=())
     pairs = list(stated.items()) if isinstance(stated, dict) else stated
-    if isinstance(pairs, Unknown) or not all(
-        isinstance(one, list | tuple) and len(one) == 2 for one in pairs
+    if isinstance(pairs, UnknownValue) or not all(
+        isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs
     ):
-        why = pairs.why if isinstance(pairs, Unknown) else "its arguments are not known"
+        why = pairs.why if isinstance(pairs, UnknownValue) else "its arguments are not known"
         return actions.Include(call.where, actions.unresolved(why), condition=call.condition)
-    return actions.Include(call.where, file, [tuple(one) for one in pairs], condition=call.condition)
+    return actions.Include(call.where, file, [tuple(pair) for pair in pairs], condition=call.condition)
 
 
-def _group(call: _Call) -> Action:
+def _group(call: _PythonCall) -> Action:
     listed = call.get("actions", 0)
-    if isinstance(listed, Unknown):
+    if isinstance(listed, UnknownValue):
         return NotMapped(call.where, f"a group is left out: {listed.why}")
     scoped = call.get("scoped", default=True) is not False
     forwarded = call.get("launch_configurations")
     lets = [actions.Let(call.where, key, value) for key, value in (forwarded or {}).items()]
-    return actions.Group(call.where, [*lets, *call.items(listed)], scoped, condition=call.condition)
+    return actions.ActionGroup(call.where, [*lets, *call.items(listed)], scoped, condition=call.condition)
 
 
-def _timer(call: _Call) -> list[Action]:
+def _timer(call: _PythonCall) -> list[Action]:
     return [
         NotMapped(call.where, "TimerAction: its nodes start with the others", lost=False),
-        actions.Group(call.where, call.items(call.get("actions")), scoped=False, condition=call.condition),
+        actions.ActionGroup(
+            call.where, call.items(call.get("actions")), scoped=False, condition=call.condition
+        ),
     ]
 
 
-def _event_handler(call: _Call) -> list[Action]:
+def _event_handler(call: _PythonCall) -> list[Action]:
     """Return the actions of ``OnProcessStart`` and the like, which start later; one of an end is a remark."""
     handler = call.get("event_handler", 0)
     listed = handler if isinstance(handler, list) else []
     remark = NotMapped(
         call.where, "RegisterEventHandler: what it starts starts with the others", lost=not listed
     )
-    return [remark, actions.Group(call.where, listed, scoped=False, condition=call.condition)]
+    return [remark, actions.ActionGroup(call.where, listed, scoped=False, condition=call.condition)]
 
 
-def _after_start(call: _Call) -> list[Any]:
+def _after_start(call: _PythonCall) -> list[Any]:
     later = call.get("on_start", default=call.get("on_completion", default=call.get("on_exit")))
-    return [one for one in call.items(later) if isinstance(one, Action | list)]
+    return [item for item in call.items(later) if isinstance(item, Action | list)]
 
 
 @dataclass
@@ -442,7 +444,7 @@ class _Opaque(Action):
 
     noun = "an OpaqueFunction"
 
-    def visit(self, scope: Scope) -> None:
+    def visit(self, scope: LaunchScope) -> None:
         """See ``Action``."""
         assert self.launch is not None
         if not isinstance(self.function, _Function):
@@ -450,14 +452,14 @@ class _Opaque(Action):
         before, self.launch.scope = self.launch.scope, scope
         try:
             made = self.launch.called(self.function, ["context", *self.arguments], dict(self.named or {}))
-            if isinstance(made, Unknown):
+            if isinstance(made, UnknownValue):
                 raise UnresolvedError(made.why)
             actions.visit_all(made if isinstance(made, list) else [made], scope)
         finally:
             self.launch.scope = before
 
 
-def _opaque(call: _Call) -> Action:
+def _opaque(call: _PythonCall) -> Action:
     return _Opaque(
         call.where,
         call.launch,
@@ -468,11 +470,11 @@ def _opaque(call: _Call) -> Action:
     )
 
 
-def _ignored(what: str, *, lost: bool = True) -> Callable[[_Call], Action]:
+def _ignored(what: str, *, lost: bool = True) -> Callable[[_PythonCall], Action]:
     return lambda call: NotMapped(call.where, what, lost, condition=call.condition)
 
 
-_ACTIONS: Mapping[str, Callable[[_Call], Any]] = {
+_ACTIONS: Mapping[str, Callable[[_PythonCall], Any]] = {
     "LaunchDescription": lambda call: Description(call.items(call.get("initial_entities", 0))),
     "DeclareLaunchArgument": lambda call: actions.Declare(
         call.where, call.get("name", 0), call.get("default_value", 1), condition=call.condition
@@ -526,7 +528,7 @@ _ACTIONS: Mapping[str, Callable[[_Call], Any]] = {
 # -- substitutions and functions
 
 
-def _python_expression(call: _Call) -> Substitution:
+def _python_expression(call: _PythonCall) -> Substitution:
     parts = call.get("expression", 0)
     return Substitution(lambda scope: _as_text(evaluated(actions.text(parts, scope), {})))
 
@@ -535,27 +537,27 @@ def _as_text(value: Any) -> str:
     return str(value)
 
 
-def _equals(call: _Call, *, negated: bool = False) -> Substitution:
+def _equals(call: _PythonCall, *, negated: bool = False) -> Substitution:
     one, other = call.get("left", 0), call.get("right", 1)
     return Substitution(lambda scope: (actions.text(one, scope) == actions.text(other, scope)) is not negated)
 
 
-def _configuration_equals(call: _Call, *, negated: bool = False) -> Substitution:
+def _configuration_equals(call: _PythonCall, *, negated: bool = False) -> Substitution:
     name, wanted = call.get("launch_configuration_name", 0), call.get("expected_value", 1)
 
-    def resolve(scope: Scope) -> bool:
+    def resolve(scope: LaunchScope) -> bool:
         stated = scope.arguments.get(actions.text(name, scope))
         return (stated == (None if wanted is None else actions.text(wanted, scope))) is not negated
 
     return Substitution(resolve)
 
 
-def _combined(call: _Call, combine: Callable[[Any], bool]) -> Substitution:
-    listed = [one for each in call.arguments for one in call.items(each)]
+def _combined(call: _PythonCall, combine: Callable[[Any], bool]) -> Substitution:
+    listed = [item for each in call.arguments for item in call.items(each)]
     return Substitution(lambda scope: str(combine(truth(actions.text(one, scope)) for one in listed)).lower())
 
 
-def _parameter_value(call: _Call) -> actions.Typed:
+def _parameter_value(call: _PythonCall) -> actions.Typed:
     kind = call.get("value_type", 1)
     return actions.Typed(call.get("value", 0), kind if kind in (int, float, bool) else _stated_type(kind))
 
@@ -564,46 +566,46 @@ def _stated_type(kind: Any) -> type | None:
     return str if kind is FUNCTIONS["str"] else None
 
 
-def _path_exists(call: _Call) -> bool:
+def _path_exists(call: _PythonCall) -> bool:
     return Path(call.plain("path", 0)).exists()
 
 
-def _joined_path(call: _Call) -> Any:
-    if any(isinstance(one, Substitution | list) for one in call.arguments):
+def _joined_path(call: _PythonCall) -> Any:
+    if any(isinstance(argument, Substitution | list) for argument in call.arguments):
         return actions.path_join(call.arguments)
-    unknown = next((one for one in call.arguments if isinstance(one, Unknown)), None)
+    unknown = next((argument for argument in call.arguments if isinstance(argument, UnknownValue)), None)
     return unknown or os.path.join(*map(str, call.arguments))  # noqa: PTH118  # "" at the end makes a slash
 
 
-def _loaded(call: _Call) -> Any:
+def _loaded(call: _PythonCall) -> Any:
     source = call.get("stream", 0)
     if isinstance(source, _Opened):
         return yaml_value(file_text(source.file), str(source.file))
-    return source if isinstance(source, Unknown) else yaml_value(str(source), "YAML")
+    return source if isinstance(source, UnknownValue) else yaml_value(str(source), "YAML")
 
 
-def _has_resource(call: _Call) -> bool | Unknown:
+def _has_resource(call: _PythonCall) -> bool | UnknownValue:
     """Return whether there is a package; other resources of the index are not known."""
     if call.plain("resource_type", 0) != "packages":
-        return Unknown("only packages are looked for in ament's index")
+        return UnknownValue("only packages are looked for in ament's index")
     try:
         return bool(call.launch.scope.folder_of(call.plain("resource_name", 1)))
     except UnresolvedError:
         return False
 
 
-def _share(call: _Call) -> str:
+def _share(call: _PythonCall) -> str:
     return str(call.launch.scope.folder_of(call.plain("package_name", 0)))
 
 
-def _rewritten(call: _Call) -> Any:
+def _rewritten(call: _PythonCall) -> Any:
     """Return the file of nav2's ``RewrittenYaml``, without the changes."""
     what = "RewrittenYaml: its changes are left out, and the parameters are those of the file"
     call.launch.note(what, call.where)
     return call.get("source_file", 0)
 
 
-_FUNCTIONS: Mapping[str, Callable[[_Call], Any]] = {
+_FUNCTIONS: Mapping[str, Callable[[_PythonCall], Any]] = {
     "LaunchConfiguration": lambda call: actions.argument(
         call.get("variable_name", 0), call.get("default", default=None)
     ),
@@ -635,11 +637,11 @@ _FUNCTIONS: Mapping[str, Callable[[_Call], Any]] = {
     "OrSubstitution": lambda call: _combined(call, any),
     "AllSubstitution": lambda call: _combined(call, all),
     "AnySubstitution": lambda call: _combined(call, any),
-    "PythonLaunchDescriptionSource": lambda call: _Source(call.get("location", 0)),
-    "XMLLaunchDescriptionSource": lambda call: _Source(call.get("location", 0)),
-    "YAMLLaunchDescriptionSource": lambda call: _Source(call.get("location", 0)),
-    "FrontendLaunchDescriptionSource": lambda call: _Source(call.get("location", 0)),
-    "AnyLaunchDescriptionSource": lambda call: _Source(call.get("location", 0)),
+    "PythonLaunchDescriptionSource": lambda call: _IncludedFile(call.get("location", 0)),
+    "XMLLaunchDescriptionSource": lambda call: _IncludedFile(call.get("location", 0)),
+    "YAMLLaunchDescriptionSource": lambda call: _IncludedFile(call.get("location", 0)),
+    "FrontendLaunchDescriptionSource": lambda call: _IncludedFile(call.get("location", 0)),
+    "AnyLaunchDescriptionSource": lambda call: _IncludedFile(call.get("location", 0)),
     "ParameterValue": _parameter_value,
     "ParameterFile": lambda call: call.get("param_file", 0),
     "RewrittenYaml": _rewritten,

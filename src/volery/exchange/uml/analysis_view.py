@@ -135,7 +135,7 @@ def _host(imp: Import, owner: Element, steps: list[Element]) -> str:
     """Return the processor that executes an owner of steps, empty if that cannot be seen."""
     processors = imp.tree.get("platform", {}).get("processors", {})
     hosts = list(_hosts(imp, owner, steps))
-    named = [imp.names[one] for one in hosts if imp.names.get(one) in processors]
+    named = [imp.names[host] for host in hosts if imp.names.get(host) in processors]
     alone = list(processors) if len(processors) == 1 else []
     return next(iter([*named, *alone]), "")
 

@@ -58,7 +58,7 @@ def read_components(imp: Import, rebase: Rebase) -> None:
             components = imp.section("components")
             name = imp.name(element, components)
             imp.finish(f"component:{name}", element)
-            components[name] = _Component(imp, element, name, rebase).read()
+            components[name] = _ImportedComponent(imp, element, name, rebase).read()
 
 
 def _plain(imp: Import) -> Iterator[Element]:
@@ -117,7 +117,7 @@ def _has_parts(imp: Import, component: Element) -> bool:
     return False
 
 
-class _Component:
+class _ImportedComponent:
     """One component that is being imported."""
 
     def __init__(self, imp: Import, element: Element, name: str, rebase: Rebase) -> None:
@@ -213,7 +213,7 @@ class _Component:
                         self.imp.finish(f"{self.key}/files-link", link)
         if linked:
             return linked
-        alone = [one for one in packages if self.imp.units_in(one) == 1]
+        alone = [package for package in packages if self.imp.units_in(package) == 1]
         return [each for package in alone for each in package if self._is_folder(each)]
 
     def _is_folder(self, element: Element) -> bool:
@@ -298,8 +298,8 @@ class _Component:
             else:
                 realized += targets
         return (
-            [one for one in dict.fromkeys(realized) if one in self.imp.names],
-            [one for one in dict.fromkeys(used) if one in self.imp.names],
+            [fromkey for fromkey in dict.fromkeys(realized) if fromkey in self.imp.names],
+            [fromkey for fromkey in dict.fromkeys(used) if fromkey in self.imp.names],
         )
 
     def _interfaces(self, application: Element | None, feature: str) -> list[Element]:

@@ -61,7 +61,7 @@ def write_design_parameters(exp: Export, model: Element, tree: Mapping[str, Any]
         listed = stated.get("paths", [])
         paths = listed if isinstance(listed, list) else [listed]
         processors = [str(path).removeprefix(_HEAD).removesuffix(_TAIL) for path in paths]
-        targets = [exp.made.get(f"processor:{one}") for one in processors]
+        targets = [exp.made.get(f"processor:{processor}") for processor in processors]
         try:
             split = [split_figure(str(value)) for value in stated.get("values", [])]
         except ValueError:
@@ -79,7 +79,7 @@ def write_design_parameters(exp: Export, model: Element, tree: Mapping[str, Any]
         ):
             exp.made[key] = before  # a range stays a range
             continue
-        comment = exp.comment(key, model, "", " ".join(xmi_id(one) for one in targets))
+        comment = exp.comment(key, model, "", " ".join(xmi_id(target) for target in targets))
         items = [number for number, _ in split]
         exp.apply(
             key,

@@ -116,8 +116,8 @@ def _stated(imp: Import, part: Element) -> dict[str, Any]:
     """Return the component of an instance."""
     kind = imp.file.reference(part, "type")
     components = imp.tree.get("components", {})
-    found: dict[str, Any] = components.get(imp.names.get(kind, ""), {}) if kind is not None else {}
-    return found
+    component: dict[str, Any] = components.get(imp.names.get(kind, ""), {}) if kind is not None else {}
+    return component
 
 
 def _is_required(imp: Import, part: Element, port: str) -> bool:

@@ -50,7 +50,10 @@ def read_interfaces(imp: Import) -> None:
     inside = [
         each for each in imp.file.model.iter(etree.Element) if local(each) in EXPOSED and each.get("name")
     ]
-    for element in [*(one for one in imp.file.elements("Interface") if one not in inside), *inside]:
+    for element in [
+        *(element for element in imp.file.elements("Interface") if element not in inside),
+        *inside,
+    ]:
         if element in inside and str(element.get("name")) in named:
             imp.names[element] = named[str(element.get("name"))]
             continue

@@ -168,13 +168,13 @@ def _read_network(imp: Import, element: Element) -> None:
             joined += imp.file.references(each, "partWithPort") or imp.file.references(each, "role")
     for link in imp.file.elements("Connector"):  # a bus is an attribute that connectors lead to
         ends = [
-            one
+            reference
             for each in link
             if local(each) == "end"
-            for one in (imp.file.references(each, "partWithPort") or imp.file.references(each, "role"))
+            for reference in (imp.file.references(each, "partWithPort") or imp.file.references(each, "role"))
         ]
         if element in ends:
-            joined += [one for one in ends if one is not element]
+            joined += [end for end in ends if end is not element]
     processors = imp.tree.get("platform", {}).get("processors", {})
     between = [imp.names[each] for each in joined if imp.names.get(each) in processors]
     between = list(dict.fromkeys(between))
@@ -324,8 +324,8 @@ def _change_ends(exp: Export, key: str, connector: Element, between: list[str]) 
     wanted = {xmi_id(exp.made[f"processor:{one}"]): one for one in between if f"processor:{one}" in exp.made}
     for end in [each for each in connector if local(each) == "end"]:
         ids = [
-            xmi_id(one)
-            for one in exp.file.references(end, "partWithPort") or exp.file.references(end, "role")
+            xmi_id(reference)
+            for reference in exp.file.references(end, "partWithPort") or exp.file.references(end, "role")
         ]
         if ids and ids[0] in wanted:
             del wanted[ids[0]]

@@ -152,7 +152,7 @@ class Times:
             made.update({"energy": energy} if energy else {})
             if position < len(rest) and isinstance(rest[position], dict):
                 made.update(rest[position])
-        return [one for one in figures if one]
+        return [figure for figure in figures if figure]
 
     def _energy(self, text: str) -> str | None:
         stated = tagged(text)
@@ -237,7 +237,7 @@ def write_times(
             energies.append(energy)
             others.append(other)
         if texts:
-            shown = [one for one in energies if one] if all(energies) else []
+            shown = [energy for energy in energies if energy] if all(energies) else []
             others = [
                 {**other, "energy": energy} if energy and not shown else other
                 for other, energy in zip(others, energies, strict=True)

@@ -28,7 +28,7 @@ from volery.exchange.xml_text import Element
 from volery.model.builder import plain_node
 from volery.model.document import Document, EnvironmentText
 from volery.model.fields import entries
-from volery.model.text import Node, Path
+from volery.model.text import Path, TextNode
 from volery.model.text import parse as parse_yaml
 
 _BOUND = re.compile(r"\{?\s*(\S+)\s*(<=|>=|≤|≥)\s*(.+?)\s*\}?\s*\Z")
@@ -110,7 +110,7 @@ def _ordered(tree: dict[str, Any]) -> dict[str, Any]:
 
 
 def _in_order(section: Mapping[str, Any], cls: type[Any]) -> dict[str, Any]:
-    known = [one.key for one in entries(cls)]
+    known = [entry.key for entry in entries(cls)]
     return {key: section[key] for key in known if key in section} | dict(section)
 
 
@@ -174,7 +174,7 @@ def _add_references(imp: Import) -> None:
     for name, component in (imp.tree.get("components") or {}).items():
         figures = [*_listed(component.get("activation"))]
         figures += [one for each in component.get("operations", {}).values() for one in _listed(each)]
-        if "at" in component or all("at" in one for one in figures):
+        if "at" in component or all("at" in figure for figure in figures):
             continue
         instances = [one for one, stated in imp.tree.get("application", {}).items() if stated["is"] == name]
         place = _processor_of(next(iter(instances), ""), places, processors)
@@ -262,7 +262,7 @@ _SECTIONS: Mapping[str, tuple[Path, ...]] = {
 """Sections of a model with the things that keys name."""
 
 
-def located(imported: Imported) -> Node:
+def located(imported: Imported) -> TextNode:
     """Return an imported model as a tree in which each entry of a section has the line of its element."""
     root = plain_node(imported.tree, Location(imported.file.name, 0))
     for key, element in imported.keys.items():

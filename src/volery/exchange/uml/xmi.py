@@ -55,9 +55,9 @@ def local(element: Element) -> str:
 def _profile_of(uri: str) -> str:
     """Return the profile of a namespace, empty if it is none of MARTE, S3D, DICE or the standard one."""
     for pattern in _PROFILES:
-        found = pattern.match(uri)
-        if found:
-            name = found.group("name")
+        match = pattern.match(uri)
+        if match:
+            name = match.group("name")
             return "S3D" if name in ("essyn_Profile", "PHARAON_Profile") else name
     return ""
 
@@ -303,7 +303,7 @@ def _put_together(root: Element, name: str, read_part: ReadPart) -> tuple[str, .
             waiting += _stubs(element, PurePosixPath(file).parent)
     own = PurePosixPath(name.replace("\\", "/")).name
     if parts:
-        _make_local(root, {own, *(PurePosixPath(one).name for one in parts)})
+        _make_local(root, {own, *(PurePosixPath(part).name for part in parts)})
     return tuple(parts)
 
 
@@ -320,22 +320,22 @@ def _make_local(root: Element, files: set[str]) -> None:
     for element in root.iter(etree.Element):
         for key, value in element.attrib.items():
             if ".uml#" in value:
-                element.set(key, " ".join(_local_reference(one, files) for one in value.split(" ")))
+                element.set(key, " ".join(_local_reference(word, files) for word in value.split(" ")))
 
 
 def _stubs(root: Element, folder: PurePosixPath) -> Iterator[tuple[Element, str, str]]:
     for each in root.iter(etree.Element):
-        found = _PART.match(str(each.get("href", ""))) if local(each) == "packagedElement" else None
-        if found:
-            path = folder / found["file"]
+        match = _PART.match(str(each.get("href", ""))) if local(each) == "packagedElement" else None
+        if match:
+            path = folder / match["file"]
             if not path.is_absolute() and ".." not in path.parts:
-                yield each, str(path), found["id"]
+                yield each, str(path), match["id"]
 
 
 def _local_reference(text: str, files: set[str]) -> str:
     """Return a reference to one of *files* as one within this file."""
-    found = _PART.match(text)
-    return f"#{found['id']}" if found and PurePosixPath(found["file"]).name in files else text
+    match = _PART.match(text)
+    return f"#{match['id']}" if match and PurePosixPath(match["file"]).name in files else text
 
 
 def _model_root(root: Element, name: str) -> Element:

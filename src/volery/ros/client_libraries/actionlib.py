@@ -101,8 +101,8 @@ _STEPS = {
 
 def steps(state: int, status: int) -> tuple[int, ...] | None:
     """Return the states that a client in *state* passes through at a server's *status*; None if it cannot."""
-    found = _STEPS[state].split()[_ORDER.index(status)]
-    return None if found == "!" else tuple(_LETTERS[letter] for letter in found if letter != "-")
+    word = _STEPS[state].split()[_ORDER.index(status)]
+    return None if word == "!" else tuple(_LETTERS[letter] for letter in word if letter != "-")
 
 
 # -- the parts of an action's type
@@ -182,7 +182,7 @@ class _Goal(_UsesRospy):
         """Follow the status that the server reports of this goal."""
         if self.state == CommState.DONE:
             return
-        own = next((one for one in statuses if one.goal_id.id == self.id), None)
+        own = next((status for status in statuses if status.goal_id.id == self.id), None)
         if own is None:
             if self.state not in (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT):
                 self.status.status = GoalStatus.LOST
@@ -258,8 +258,8 @@ class ClientGoalHandle:
             goal.rospy.logwarn(
                 f"terminal state of goal {goal.id}, which is {get_name_of_constant(CommState, goal.state)}"
             )
-        found = self.get_goal_status()
-        return found if found in _ENDINGS else GoalStatus.LOST
+        status = self.get_goal_status()
+        return status if status in _ENDINGS else GoalStatus.LOST
 
 
 _ENDINGS = [value for name, value in vars(TerminalState).items() if name.isupper()]
@@ -327,7 +327,7 @@ class ActionClient(_UsesRospy):
 
     def _connected(self) -> bool:
         ends = (*self._subscribers, self._goal, self._cancel)
-        return self._heard and all(one.get_num_connections() for one in ends)
+        return self._heard and all(end.get_num_connections() for end in ends)
 
     def _on_status(self, message: Any) -> None:
         self._heard = True
@@ -408,9 +408,9 @@ class SimpleActionClient(_UsesRospy):
         """Return the status of the goal; those on the way to an end are PENDING and ACTIVE."""
         if self.gh is None:
             return int(GoalStatus.LOST)
-        found = self.gh.get_goal_status()
+        status = self.gh.get_goal_status()
         shown = {GoalStatus.RECALLING: GoalStatus.PENDING, GoalStatus.PREEMPTING: GoalStatus.ACTIVE}
-        return int(shown.get(found, found))
+        return int(shown.get(status, status))
 
     def get_goal_status_text(self) -> str:
         """Return the text of the server's last status."""

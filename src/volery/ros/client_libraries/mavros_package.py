@@ -160,8 +160,8 @@ class _Namespaces:
         answer = self.service("param/pull", "ParamPull")(force_pull=force_pull)
         if not answer.success:
             raise OSError("Request failed: the parameters were not received")
-        found = self.rospy.get_param(self.get_topic("param"), {})
-        return answer.param_received, [Parameter(name, found[name]) for name in sorted(found)]
+        param = self.rospy.get_param(self.get_topic("param"), {})
+        return answer.param_received, [Parameter(name, param[name]) for name in sorted(param)]
 
     def param_set_list(self, param_list: list[Parameter]) -> int:
         """Set parameters of the autopilot; return how many."""

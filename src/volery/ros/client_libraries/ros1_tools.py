@@ -17,7 +17,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.ros.client_libraries.library_base import file_of_user, library_module, scalar
-from volery.ros.messages import Message, Workspace
+from volery.ros.messages import RosMessage, Workspace
 from volery.ros.messages.client_classes import (
     ROSPY,
     DeserializationError,
@@ -221,7 +221,7 @@ class _Commands:
     def list_params(self, ns: str) -> list[str]:
         """Return the names of the parameters in a namespace."""
         full = self._rospy.resolve_name(ns).rstrip("/")
-        return [one for one in self._rospy.get_param_names() if one.startswith(f"{full}/")]
+        return [name for name in self._rospy.get_param_names() if name.startswith(f"{full}/")]
 
     def upload_params(self, ns: str, values: Any, verbose: bool = False) -> None:
         """Set the parameters of a namespace."""
@@ -235,13 +235,13 @@ class _Commands:
     def get_service_list(self, node: str | None = None, namespace: str | None = None, **_: Any) -> list[str]:
         """Return the names of all services, of one node or in one namespace."""
         below = f"/{(namespace or '').strip('/')}/".replace("//", "/")
-        found = [one for one in self._services() if node in (None, one.server)]
-        return [one.name for one in found if one.name.startswith(below)]
+        services = [service for service in self._services() if node in (None, service.server)]
+        return [one.name for one in services if one.name.startswith(below)]
 
     def get_service_type(self, service_name: str) -> str | None:
         """Return the type of a service; None if there is none."""
         full = self._rospy.resolve_name(service_name)
-        return next((ros1_name(one.type) for one in self._services() if one.name == full), None)
+        return next((ros1_name(service.type) for service in self._services() if service.name == full), None)
 
     def get_service_class_by_name(self, service_name: str) -> Any:
         """Return the class of a service; raise ``ROSServiceException`` if there is none."""
@@ -309,7 +309,7 @@ def _genpy() -> dict[str, ModuleType]:
     """Return the modules of ``genpy`` by name, and ``roslib.message``."""
     times = {name: message_of(f"builtin_interfaces/msg/{name}", ROSPY) for name in ("Time", "Duration")}
     errors = (MessageException, SerializationError, DeserializationError)
-    names = {"Message": Message, **{one.__name__: one for one in errors}, **times}
+    names = {"Message": RosMessage, **{error.__name__: error for error in errors}, **times}
     classes = {one.__name__: one for one in (get_message_class, get_service_class)}
     parts = {
         "genpy.message": library_module("genpy.message", {**names, **classes}),
@@ -376,7 +376,7 @@ def read_points_list(
 
     As in sensor_msgs, the names are assigned in the order given, the values in that of the offsets.
     """
-    names = list(field_names) if field_names else [one.name for one in cloud.fields]
+    names = list(field_names) if field_names else [field.name for field in cloud.fields]
     point: Any = namedtuple("Point", names)  # type: ignore[misc]  # the names are the cloud's
     return [point._make(one) for one in read_points(cloud, names, skip_nans, uvs)]
 

@@ -58,7 +58,7 @@ class _AmentIndex:
         found = self._workspace.installed(package_name) or self._workspace.find(package_name, file)
         if found is None:
             near = did_you_mean(package_name, self._workspace.names(file))
-            paths = [str(one) for one in entries("AMENT_PREFIX_PATH")]
+            paths = [str(entry) for entry in entries("AMENT_PREFIX_PATH")]
             raise PackageNotFoundError(
                 f"package '{package_name}' not found{near}, searching: {paths} and the workspace of the file"
             )
@@ -79,7 +79,7 @@ class _AmentIndex:
         return {name: self.get_package_prefix(name) for name in names}
 
     def get_search_paths(self) -> list[str]:
-        return [str(one) for one in entries("AMENT_PREFIX_PATH") if one.is_dir()]
+        return [str(entry) for entry in entries("AMENT_PREFIX_PATH") if entry.is_dir()]
 
     def get_resources(self, resource_type: str) -> dict[str, str]:
         self._check(resource_type, "type", InvalidResourceTypeNameError)
@@ -219,7 +219,7 @@ def create_cloud(header: Any, fields: Sequence[Any], points: Any, point_step: in
         made = np.zeros(len(points := list(points)), dtype=kind)
         for one in points:
             assert len(one) == len(kind.names), _NOT_FITTING
-        made[:] = [tuple(one) for one in points]
+        made[:] = [tuple(point) for point in points]
         points = made
     elif points.dtype.names is None:
         assert points.shape[-1] == len(kind.names), _NOT_FITTING
@@ -348,7 +348,7 @@ def _plain(value: Any, options: dict[str, Any], kind: str) -> Any:
     if options["no_arr"]:
         return f"<array type: {kind.partition('[')[0]}, length: {len(value)}>"
     items = [_plain(one, options, kind) for one in list(value)[:longest]]
-    items = [one.item() if isinstance(one, np.generic) else one for one in items]
+    items = [item.item() if isinstance(item, np.generic) else item for item in items]
     return [*items, "..."] if longest is not None and len(value) > longest else items
 
 
@@ -381,7 +381,7 @@ def message_to_csv(msg: Any, **options: Any) -> str:
 
 
 def _names(*functions: Any) -> dict[str, Any]:
-    return {one.__name__: one for one in functions}
+    return {function.__name__: function for function in functions}
 
 
 def modules() -> dict[str, ModuleType]:

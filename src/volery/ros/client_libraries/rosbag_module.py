@@ -125,7 +125,7 @@ class Bag:
     def get_type_and_topic_info(self, topic_filters: Any = None) -> TypesAndTopicsTuple:
         """Return the types with their checksums, and the topics."""
         wanted = _listed(topic_filters)
-        found = [one for one in self._opened().topics if wanted is None or one.name in wanted]
+        found = [topic for topic in self._opened().topics if wanted is None or topic.name in wanted]
         types = {ros1_name(one.type): ros1_type(one.type).md5 for one in found}
         topics = {one.name: TopicTuple(ros1_name(one.type), one.messages, 1, None) for one in found}
         return TypesAndTopicsTuple(types, topics)
@@ -149,7 +149,7 @@ class Bag:
     def _counts(self) -> list[tuple[str, int]]:
         if self._writer is not None:
             return list(self._written.items())
-        return [(one.name, one.messages) for one in self._read.topics]
+        return [(topic.name, topic.messages) for topic in self._read.topics]
 
     def _opened(self) -> Any:
         if self._writer is not None:

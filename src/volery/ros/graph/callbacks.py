@@ -22,7 +22,7 @@ FIRST, NEXT = 1.0, 0.0
 
 
 class CallbackGroup:
-    """See ``volery.ros.graph.interface.Group``.
+    """See ``volery.ros.graph.interface.ReadyCallbacks``.
 
     A wait in ``spin_once`` ends the caller's activation; the callback that ends the wait is a new one,
     released when its message, request or timer arrived. Polling (``within=0``) belongs to the activation in
@@ -134,7 +134,7 @@ class CallbackGroup:
 
 
 class NodeRate:
-    """See ``volery.ros.graph.interface.Rate``; a ``volery.kernel.waiting.Rate`` whose sleeps are priced."""
+    """See ``volery.ros.graph.interface.LoopRate``; a ``Rate`` of the kernel whose sleeps are priced."""
 
     def __init__(self, node: NodeContext, period: Ns) -> None:
         self._node = node

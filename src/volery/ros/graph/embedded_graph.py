@@ -23,7 +23,7 @@ from volery.ros.graph.endpoints import (
     EmbeddedSubscription,
     topic_named,
 )
-from volery.ros.graph.graph_context import GraphContext, NodeContext, Parameters, Recorded, Records
+from volery.ros.graph.graph_context import GraphContext, NodeContext, ParameterTree, Recorded, Records
 from volery.ros.graph.interface import (
     AS_OFFERED,
     CLOCK,
@@ -32,12 +32,12 @@ from volery.ros.graph.interface import (
     DEFAULT,
     INVALID_VALUES,
     Callback,
-    Group,
     Handler,
     NameTakenError,
     Node,
     Publisher,
     QoS,
+    ReadyCallbacks,
     RosGraph,
     Routing,
     ServiceState,
@@ -49,9 +49,9 @@ from volery.ros.graph.interface import (
     full_node_name,
     no_route,
 )
-from volery.ros.graph.unserved import SERVICE, TRANSFORM, Surroundings, unserved
+from volery.ros.graph.unserved import SERVICE, TRANSFORM, KnownParticipants, unserved
 from volery.ros.graph.work import Work
-from volery.ros.messages import Message, cdr_size, new
+from volery.ros.messages import RosMessage, cdr_size, new
 from volery.trace.events import Unserved
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class LocalNode:
         """Return a new group; `start` is called at once with each callback that is ready, and none waits."""
         return self._new_group(f"callbacks of group {len(self._groups)}", start)
 
-    def _group_of(self, group: Group | None) -> CallbackGroup:
+    def _group_of(self, group: ReadyCallbacks | None) -> CallbackGroup:
         if group is None:
             return self._own
         if not isinstance(group, CallbackGroup) or group not in self._groups:
@@ -136,7 +136,9 @@ class LocalNode:
             except INVALID_VALUES as error:
                 refused(index, error)
 
-    def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> NodeTimer:
+    def timer(
+        self, period: Ns, callback: Callable[[], None], group: ReadyCallbacks | None = None
+    ) -> NodeTimer:
         """Call back every `period` ns."""
         with self._graph.kernel.interact():
             self._node.check_open()
@@ -232,7 +234,7 @@ class EmbeddedNode(LocalNode):
         message_type: str,
         callback: Callback,
         qos: QoS = AS_OFFERED,
-        group: Group | None = None,
+        group: ReadyCallbacks | None = None,
     ) -> EmbeddedSubscription:
         """Call `callback` with each message of a topic."""
         with self._graph.kernel.interact():
@@ -245,7 +247,7 @@ class EmbeddedNode(LocalNode):
             return self._keep(EmbeddedSubscription(self._node, found, callback, qos, into))
 
     def serve(
-        self, name: str, service_type: str, handler: Handler, group: Group | None = None
+        self, name: str, service_type: str, handler: Handler, group: ReadyCallbacks | None = None
     ) -> EmbeddedService:
         """Answer requests."""
         with self._graph.kernel.interact():
@@ -351,7 +353,7 @@ class EmbeddedGraph:
         epoch: Ns = 0,
         unrecorded: bool = False,
         as_bytes: bool = False,
-        size_of: Callable[[Message], int] = cdr_size,
+        size_of: Callable[[RosMessage], int] = cdr_size,
     ) -> None:
         self.kernel = kernel
         self._graph = GraphContext(
@@ -379,7 +381,7 @@ class EmbeddedGraph:
         return self._graph.changed
 
     @property
-    def parameters(self) -> Parameters:
+    def parameters(self) -> ParameterTree:
         """All parameters, by absolute name."""
         return self._graph.parameters
 
@@ -442,8 +444,8 @@ class EmbeddedGraph:
             one for _, first in sorted(self._graph.topics.items()) for one in (first, *first.others.values())
         )
         for topic in listed:
-            publishers = tuple(one.node.name for one in topic.publishers)
-            subscribers = tuple(one.node.name for one in topic.subscriptions)
+            publishers = tuple(publisher.node.name for publisher in topic.publishers)
+            subscribers = tuple(subscription.node.name for subscription in topic.subscriptions)
             if publishers or subscribers:
                 states.append(TopicState(topic.name, topic.type, publishers, subscribers))
         return states
@@ -451,12 +453,12 @@ class EmbeddedGraph:
     def offered(self, topic: str) -> tuple[QoS, ...]:
         """Return what the publishers of a topic offer."""
         found = self._graph.topics.get(topic)
-        return tuple(one.qos for one in found.publishers) if found is not None else ()
+        return tuple(publisher.qos for publisher in found.publishers) if found is not None else ()
 
     def requested(self, topic: str) -> tuple[QoS, ...]:
         """Return what the subscriptions to a topic request."""
         found = self._graph.topics.get(topic)
-        return tuple(one.qos for one in found.subscriptions) if found is not None else ()
+        return tuple(subscription.qos for subscription in found.subscriptions) if found is not None else ()
 
     def has_subscribers(self, topic_name: str) -> bool:
         """Return whether a node subscribes to the topic, without being an interaction point."""
@@ -482,7 +484,7 @@ class EmbeddedGraph:
             want.count += 1
             want.reason = problem
 
-    def unserved(self, around: Surroundings) -> list[Unserved]:
+    def unserved(self, around: KnownParticipants) -> list[Unserved]:
         """Return what components have offered or asked for until now, and no node took or served."""
         return unserved(self._graph.wants, around, self.kernel.now())
 

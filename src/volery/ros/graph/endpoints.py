@@ -54,8 +54,8 @@ def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeCon
         other = found.others.get(full)
         if other is None:
             other = found.others[full] = Topic(name, full)
-            users = [one.node.name for one in found.publishers] + [
-                one.node.name for one in found.subscriptions
+            users = [publisher.node.name for publisher in found.publishers] + [
+                subscription.node.name for subscription in found.subscriptions
             ]
             of = ", ".join(dict.fromkeys(users)) or "no node any more"
             text = f"{name} carries {found.type} (of {of}), not {full}: these nodes do not hear each other"
@@ -185,8 +185,10 @@ class EmbeddedPublisher:
 
     def disconnect(self, subscription: SubscriptionEnd) -> None:
         """Stop sending to a subscription."""
-        ended = [one for one in self._connections if one.to is subscription]
-        self._connections = [one for one in self._connections if one.to is not subscription]
+        ended = [connection for connection in self._connections if connection.to is subscription]
+        self._connections = [
+            connection for connection in self._connections if connection.to is not subscription
+        ]
         self._set_spacing()
         if self._on_change is not None:
             for connection in ended:
@@ -201,7 +203,7 @@ class EmbeddedPublisher:
     def _set_spacing(self) -> None:
         graph, self._due = self.node.graph, 0
         if graph.unrecorded and not graph.as_bytes:
-            self._spacing = min((one.to.qos.spacing for one in self._connections), default=0)
+            self._spacing = min((connection.to.qos.spacing for connection in self._connections), default=0)
 
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is when the call has been served."""
@@ -405,7 +407,7 @@ def failure_text(error: Exception) -> str:
     return f"{HANDLER_FAILED}raised {type(error).__name__}: {error}"
 
 
-class Exchange:
+class ServiceExchange:
     """A request and its answer, in transit."""
 
     __slots__ = ("answer", "answered", "caller", "problem", "request")
@@ -445,12 +447,12 @@ class EmbeddedService:
         self.name, self.type = name, kind.name
         self._kind = kind
         self._handler, self._group = handler, group
-        self._pending: list[Exchange] = []
+        self._pending: list[ServiceExchange] = []
         self.caller = ""  # node that sent the request whose handler begins
         node.graph.services[name] = self
         node.graph.wants.served[name] = self.type
 
-    def arrive(self, exchange: Exchange) -> None:
+    def arrive(self, exchange: ServiceExchange) -> None:
         """Queue a request that has arrived. A framework callback."""
         if self.node.graph.services.get(self.name) is not self:
             self._send_back(exchange, exchange.fail, "its server has gone", 0)
@@ -458,7 +460,7 @@ class EmbeddedService:
         self._pending.append(exchange)
         self._group.add(Work(self.node.kernel.now(), partial(self.answer, exchange)))
 
-    def answer(self, exchange: Exchange) -> None:
+    def answer(self, exchange: ServiceExchange) -> None:
         """Run the handler and send the answer; an exception is reported to the caller and raised again."""
         if exchange not in self._pending:
             return
@@ -485,7 +487,9 @@ class EmbeddedService:
             self._pending.remove(exchange)
             self._send_back(exchange, exchange.succeed, content, size)
 
-    def _send_back(self, exchange: Exchange, end: Callable[[Any], None], content: Any, size: int) -> None:
+    def _send_back(
+        self, exchange: ServiceExchange, end: Callable[[Any], None], content: Any, size: int
+    ) -> None:
         lost = partial(exchange.fail, "the answer was lost on the way")
         self.node.graph.carry(self.node, exchange.caller, size, partial(end, content), lost)
 
@@ -518,7 +522,7 @@ class EmbeddedClient:
             start = kernel.now()
             server = self._server(request)
             node.consume_if_priced("call_service")
-            exchange = Exchange(node, node.graph.copy(request), self.name)
+            exchange = ServiceExchange(node, node.graph.copy(request), self.name)
             node.graph.carry(
                 node,
                 server.node,

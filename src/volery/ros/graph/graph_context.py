@@ -21,7 +21,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.interface import NodeId, QoS, Routing, Tariffs
 from volery.ros.graph.unserved import Want, Wants
-from volery.ros.messages import Message, cdr_size, from_cdr, to_cdr
+from volery.ros.messages import RosMessage, cdr_size, from_cdr, to_cdr
 from volery.trace.events import Charge, Event
 
 
@@ -88,7 +88,7 @@ class Topic:
         self.others: dict[str, Topic] = {}
 
 
-class Parameters:
+class ParameterTree:
     """Parameter values by absolute name; a namespace reads as a ``dict`` of what is below it."""
 
     def __init__(self) -> None:
@@ -176,12 +176,12 @@ class GraphContext:
     epoch: Ns
     changed: Signal
     listen_to_clock: Callable[[], None] = lambda: None
-    parameters: Parameters = field(default_factory=Parameters)
+    parameters: ParameterTree = field(default_factory=ParameterTree)
     topics: dict[str, Topic] = field(default_factory=dict)
     services: dict[str, ServiceEnd] = field(default_factory=dict)
     unrecorded: bool = False
     as_bytes: bool = False
-    size_of: Callable[[Message], int] = cdr_size
+    size_of: Callable[[RosMessage], int] = cdr_size
     wants: Wants = field(default_factory=Wants)
 
     def record(self, event: Event) -> None:
@@ -189,7 +189,7 @@ class GraphContext:
         if not self.unrecorded:
             self.kernel.record(event)
 
-    def copy(self, message: Message) -> Any:
+    def copy(self, message: RosMessage) -> Any:
         """Return a copy of `message` as its receivers get it."""
         return from_cdr(message.__msgtype__, to_cdr(message)) if self.as_bytes else message.copy()
 

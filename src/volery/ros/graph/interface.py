@@ -85,7 +85,7 @@ class NodeId(NamedTuple):
     processor: str
 
 
-class Cost(Protocol):
+class CallTime(Protocol):
     """Execution time of a call on the node's processor, ns."""
 
     @property
@@ -97,7 +97,7 @@ class Cost(Protocol):
         """Executed by the process in the background, ns."""
 
 
-Tariff = Callable[[str, float, Warmth], Cost]
+Tariff = Callable[[str, float, Warmth], CallTime]
 """``tariff(call, x, warmth)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
 ``advertise``, ``subscribe``, ``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the
 topic), ``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it).
@@ -214,7 +214,7 @@ class Timer(Protocol):
         """Stop the timer."""
 
 
-class Rate(Protocol):
+class LoopRate(Protocol):
     """Keeps a loop at a period."""
 
     def sleep(self) -> None:
@@ -224,7 +224,7 @@ class Rate(Protocol):
         """Return the time until the next release, ns; 0 for a late loop."""
 
 
-class Group(Protocol):
+class ReadyCallbacks(Protocol):
     """A queue of callbacks that are ready; the task that spins it runs them one after the other."""
 
     def spin_once(self, within: Ns | None = None) -> bool:
@@ -273,13 +273,13 @@ class Node(Protocol):
         """Whether it has left the graph."""
 
     @property
-    def own_group(self) -> Group:
+    def own_group(self) -> ReadyCallbacks:
         """Group of the callbacks that are given none."""
 
     def resolve(self, name: str) -> str:
         """Return the absolute name, remappings applied; ``UsageError`` if it is no valid ROS name."""
 
-    def group(self, start: Callable[[Work], None] | None = None) -> Group:
+    def group(self, start: Callable[[Work], None] | None = None) -> ReadyCallbacks:
         """Return a new group, for callbacks that run concurrently with those of the node's own group.
 
         Args:
@@ -308,11 +308,13 @@ class Node(Protocol):
         message_type: str,
         callback: Callback,
         qos: QoS = AS_OFFERED,
-        group: Group | None = None,
+        group: ReadyCallbacks | None = None,
     ) -> Subscription:
         """Call `callback` with each message of a topic, in `group` or else the node's own group."""
 
-    def serve(self, name: str, service_type: str, handler: Handler, group: Group | None = None) -> Service:
+    def serve(
+        self, name: str, service_type: str, handler: Handler, group: ReadyCallbacks | None = None
+    ) -> Service:
         """Answer requests: `handler` gets the request and returns the response."""
 
     def client(self, name: str, service_type: str) -> Client:
@@ -321,10 +323,10 @@ class Node(Protocol):
     def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
         """Block until a node serves `name`; return False if `within` ns have passed first."""
 
-    def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> Timer:
+    def timer(self, period: Ns, callback: Callable[[], None], group: ReadyCallbacks | None = None) -> Timer:
         """Call back every `period` ns, for the first time after one period."""
 
-    def rate(self, period: Ns) -> Rate:
+    def rate(self, period: Ns) -> LoopRate:
         """Return what keeps the loop of the current task at `period` ns."""
 
     def sleep(self, duration: Ns) -> None:

@@ -22,7 +22,7 @@ from volery.ros.graph.interface import (
     RosGraph,
     Subscription,
 )
-from volery.ros.messages import Message, new
+from volery.ros.messages import RosMessage, new
 from volery.ros.messages.bags import Bag, BagConnection, BagWriter, qos_profile
 from volery.ros.messages.containers import Offer
 
@@ -96,7 +96,7 @@ class Recorder:
             except UsageError as error:
                 self.problems[topic.name] = str(error)
 
-    def _write(self, topic: str, message: Message) -> None:
+    def _write(self, topic: str, message: RosMessage) -> None:
         if topic in self.problems:
             return
         offer = self._offers[topic]
@@ -175,7 +175,7 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     """
     publishers = _advertise(node, bag, how)
     clock = node.advertise(CLOCK, "rosgraph_msgs/msg/Clock", QoS(1)) if how.clock else None
-    while how.wait_for_subscribers and not all(one.subscribers() for one in publishers.values()):
+    while how.wait_for_subscribers and not all(publisher.subscribers() for publisher in publishers.values()):
         node.sleep(_LOOK_PERIOD)
     node.sleep(from_seconds(how.delay))
     played = _pass(node, bag, how, publishers, clock)
@@ -215,16 +215,16 @@ _HEADER = "std_msgs/msg/Header"
 
 def _move_stamps(value: Any, by: Ns) -> None:
     """Add *by* to the stamps of all headers in a message; one that is 0 states no time and stays."""
-    if isinstance(value, Message) and value.__msgtype__ == _HEADER:
+    if isinstance(value, RosMessage) and value.__msgtype__ == _HEADER:
         header: Any = value
         stamp = header.stamp
         at = stamp.sec * S + stamp.nanosec
         if at:
             stamp.sec, stamp.nanosec = divmod(max(at + by, 0), S)
-    elif isinstance(value, Message):
+    elif isinstance(value, RosMessage):
         for name in value.__match_args__:
             _move_stamps(getattr(value, name), by)
-    elif isinstance(value, list) and value and isinstance(value[0], Message):
+    elif isinstance(value, list) and value and isinstance(value[0], RosMessage):
         for each in value:
             _move_stamps(each, by)
 
@@ -249,27 +249,31 @@ def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
         wanted -= {CLOCK}
     made = {}
     for name in sorted(wanted):
-        connections = [one for one in bag.connections if one.source.topic == name and not one.problem]
+        connections = [
+            connection
+            for connection in bag.connections
+            if connection.source.topic == name and not connection.problem
+        ]
         counts: dict[str, int] = {}
         for one in connections:
             counts[one.source.type] = counts.get(one.source.type, 0) + one.messages
         kind = max(counts, key=lambda one: counts[one])
-        others = [one for one in counts if one != kind]
+        others = [count for count in counts if count != kind]
         if others:
             bag.note(f"{name} has several types; {kind} is played, {', '.join(others)} is not")
-        played = [one for one in connections if one.source.type == kind]
+        played = [connection for connection in connections if connection.source.type == kind]
         made[name] = node.advertise(name, kind, _offered(name, played))
     return made
 
 
 def _offered(name: str, connections: Collection[BagConnection]) -> QoS:
     """Return the QoS of a topic as it was recorded."""
-    profiles = [profile for one in connections for profile in one.source.offer.qos]
-    unreliable = bool(profiles) and all(one.reliability.name == "BEST_EFFORT" for one in profiles)
+    profiles = [profile for connection in connections for profile in connection.source.offer.qos]
+    unreliable = bool(profiles) and all(profile.reliability.name == "BEST_EFFORT" for profile in profiles)
     reliability = BEST_EFFORT if unreliable else RELIABLE
-    latched = [one for one in connections if one.source.offer.latched]
+    latched = [connection for connection in connections if connection.source.offer.latched]
     if latched or (name in _LATCHED and not profiles):
-        depth = max(len(latched), 1, *(one.depth for one in profiles))
+        depth = max(len(latched), 1, *(profile.depth for profile in profiles))
         return QoS(depth, reliability, TRANSIENT_LOCAL)
     return QoS(_DEPTH, reliability, VOLATILE)
 

@@ -87,7 +87,7 @@ class Wants:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class KnownParticipants:
     """What a run knows beside the graph.
 
     Attributes:
@@ -101,7 +101,7 @@ class Surroundings:
     without_node: Collection[str] = ()
 
 
-def unserved(wants: Wants, around: Surroundings, now: Ns) -> list[Unserved]:
+def unserved(wants: Wants, around: KnownParticipants, now: Ns) -> list[Unserved]:
     """Return what no node took or served until *now*: requests before offers, then by time and name."""
     entries = list(wants.entries.values())
     merged: dict[tuple[str, str], list[Want]] = {}
@@ -154,7 +154,7 @@ def _action_of(want: Want) -> tuple[str, str] | None:
     return None
 
 
-def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surroundings) -> str:
+def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: KnownParticipants) -> str:
     """Return what is there instead and what to do, or an empty string."""
     other = PUBLISHED if kind == SUBSCRIBED else SUBSCRIBED
     for want in wants.entries.values():
@@ -182,7 +182,7 @@ def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surro
 def _counterparts(kind: str, name: str, type_name: str, wants: Wants) -> list[str]:
     """Return the names of the other side, those of the same type if there are any."""
     other = PUBLISHED if kind == SUBSCRIBED else SUBSCRIBED
-    topics = [(one.name, one.type) for one in wants.entries.values() if one.kind == other]
+    topics = [(entry.name, entry.type) for entry in wants.entries.values() if entry.kind == other]
     found: Iterable[tuple[str, str]] = topics if kind in (PUBLISHED, SUBSCRIBED) else wants.served.items()
     if kind == ACTION:
         end = _ACTION_OF_ROS2 + "send_goal" if type_name in wants.served.values() else "/goal"

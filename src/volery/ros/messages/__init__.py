@@ -17,7 +17,7 @@ from volery.ros.messages.encodings import (
     to_cdr,
     to_ros1,
 )
-from volery.ros.messages.message import Message
+from volery.ros.messages.message import RosMessage
 from volery.ros.messages.packages import define_imported, define_packages, modules
 from volery.ros.messages.store import (
     ServiceType,
@@ -38,9 +38,9 @@ from volery.ros.messages.workspace import Workspace
 
 __all__ = [
     "Library",
-    "Message",
     "Ros1Service",
     "Ros1Type",
+    "RosMessage",
     "ServiceType",
     "Workspace",
     "cdr_size",

@@ -38,14 +38,14 @@ from volery.ros.messages.containers import (
     NO_OFFER,
     Offer,
     RawMessage,
+    RecordedTopic,
     Rosbag2Reader,
-    Source,
     recover_mcap,
     recover_rosbag1,
     source_of,
 )
 from volery.ros.messages.encodings import ros1_name, ros1_type, to_cdr, to_ros1
-from volery.ros.messages.message import Message
+from volery.ros.messages.message import RosMessage
 from volery.ros.messages.recorded_types import RecordedType, Written
 from volery.ros.messages.store import message_class, message_name, store
 
@@ -74,7 +74,7 @@ class BagMessage(NamedTuple):
 
     at: Ns
     topic: str
-    message: Message
+    message: RosMessage
 
 
 class BagConnection:
@@ -87,7 +87,7 @@ class BagConnection:
         problem: Why they cannot be decoded; empty if they can.
     """
 
-    def __init__(self, source: Source, messages: int, distribution: str) -> None:
+    def __init__(self, source: RecordedTopic, messages: int, distribution: str) -> None:
         self.source, self.messages = source, messages
         self.recorded: RecordedType | None = None
         self.problem = ""
@@ -129,25 +129,31 @@ class Bag:
     def topics(self) -> tuple[BagTopic, ...]:
         """Topics with their types, by name."""
         counts: Counter[tuple[str, str]] = Counter()
-        for one in self.connections:
-            counts[one.source.topic, one.source.type] += one.messages
+        for connection in self.connections:
+            counts[connection.source.topic, connection.source.type] += connection.messages
         return tuple(BagTopic(*key, counts[key]) for key in sorted(counts))
 
     @property
     def unreadable(self) -> dict[str, str]:
         """Reasons why messages of a topic cannot be decoded, by topic."""
-        return {one.source.topic: one.problem for one in self.connections if one.problem}
+        return {
+            connection.source.topic: connection.problem
+            for connection in self.connections
+            if connection.problem
+        }
 
     @property
     def usual(self) -> list[str]:
         """Topics that are read by default: all that can be decoded, without those of a run's trace."""
-        names = {one.source.topic for one in self.connections if not one.problem}
+        names = {connection.source.topic for connection in self.connections if not connection.problem}
         return sorted(name for name in names if not name.startswith(OF_THE_RUN))
 
     @property
     def omitted(self) -> dict[str, int]:
         """Topics of a run's trace, and how many long messages without their content they have."""
-        counts = ((one.source.topic.removeprefix(OMITTED), one) for one in self.connections)
+        counts = (
+            (connection.source.topic.removeprefix(OMITTED), connection) for connection in self.connections
+        )
         return {topic: one.messages for topic, one in counts if topic != one.source.topic}
 
     def omission(self, topics: Collection[str]) -> str:
@@ -159,16 +165,22 @@ class Bag:
     @property
     def differences(self) -> list[str]:
         """How definitions of messages read so far differ from ours, in sentences."""
-        found = (one.recorded.differences() for one in self.connections if one.recorded is not None)
+        found = (
+            connection.recorded.differences()
+            for connection in self.connections
+            if connection.recorded is not None
+        )
         return sorted({one for one in found if one})
 
     @property
     def left_out(self) -> dict[str, str]:
         """Fields of messages read so far that another definition lacks, by topic."""
         return {
-            one.source.topic: f"{one.source.type} has no {', '.join(one.recorded.left_out)} there"
-            for one in self.connections
-            if one.recorded is not None and one.recorded.left_out
+            connection.source.topic: (
+                f"{connection.source.type} has no {', '.join(connection.recorded.left_out)} there"
+            )
+            for connection in self.connections
+            if connection.recorded is not None and connection.recorded.left_out
         }
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
@@ -185,7 +197,7 @@ class Bag:
 
     def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[BagConnection, RawMessage]]:
         """Yield the messages of `topics` and their connections, also those that cannot be decoded."""
-        known = {one.source: one for one in self.connections}
+        known = {connection.source: connection for connection in self.connections}
         for raw in self._raw():
             connection = known.get(raw.source)
             if connection is None:  # only its undamaged part is known
@@ -200,7 +212,7 @@ class Bag:
 
     def _raw(self) -> Iterator[RawMessage]:
         if self.parts:
-            for _, raw in merge(*(one.raw() for one in self.parts), key=lambda pair: pair[1].at):
+            for _, raw in merge(*(part.raw() for part in self.parts), key=lambda pair: pair[1].at):
                 yield raw
             return
         if not self.indexed:
@@ -282,10 +294,10 @@ def _of_files(path: Path, problem: str) -> Bag:
             damage.append(str(error))
     if not parts:
         raise UsageError(f"{path} is no rosbag 2 that can be read: {'; '.join([problem, *damage])}")
-    counts: Counter[Source] = Counter()
+    counts: Counter[RecordedTopic] = Counter()
     for one in (connection for part in parts for connection in part.connections):
         counts[one.source] += one.messages
-    filled = [part for part in parts if any(one.messages for one in part.connections)]
+    filled = [part for part in parts if any(connection.messages for connection in part.connections)]
     return Bag(
         path,
         ROSBAG2,
@@ -303,21 +315,21 @@ def _reader(path: Path, kind: str) -> Any:
     return Reader1(path) if kind == ROSBAG1 else Rosbag2Reader(path)
 
 
-def _sources(reader: Any) -> dict[int, Source]:
+def _sources(reader: Any) -> dict[int, RecordedTopic]:
     """Return the connections of a reader by their numbers; ROS 1's senders are in a folder's own data."""
     senders = {}
     if isinstance(reader, Rosbag2Reader):
         senders = reader.storage.metadata.custom or {}
     found = {}
-    for one in reader.connections:
-        source = source_of(one)
+    for connection in reader.connections:
+        source = source_of(connection)
         sender = senders.get(f"{SENDER}{source.topic}", source.offer.sender)
-        found[one.id] = source._replace(offer=source.offer._replace(sender=sender))
+        found[connection.id] = source._replace(offer=source.offer._replace(sender=sender))
     return found
 
 
 def _indexed(path: Path, kind: str) -> Bag:
-    counts: Counter[Source] = Counter()
+    counts: Counter[RecordedTopic] = Counter()
     with _reader(path, kind) as reader:
         sources = _sources(reader)
         for connection in reader.connections:
@@ -327,13 +339,13 @@ def _indexed(path: Path, kind: str) -> Bag:
     return Bag(path, kind, _connections(counts, distribution), start, end, True)
 
 
-def _connections(counts: Counter[Source], distribution: str = "") -> tuple[BagConnection, ...]:
+def _connections(counts: Counter[RecordedTopic], distribution: str = "") -> tuple[BagConnection, ...]:
     ordered = sorted(counts, key=lambda one: (one.topic, one.type, one.offer.sender))
     return tuple(BagConnection(one, counts[one], distribution) for one in ordered)
 
 
 def _salvaged(path: Path, kind: str, problem: str) -> Bag:
-    counts: Counter[Source] = Counter()
+    counts: Counter[RecordedTopic] = Counter()
     times: list[Ns] = []
     damage: list[str] = []
     for raw in _recover(path, kind, damage):
@@ -373,7 +385,7 @@ def qos_profile(reliable: bool, latched: bool, depth: int = 0) -> Qos:
 class BagWriter(Protocol):
     """A recording in progress; a context manager. It must be closed to be complete."""
 
-    def write(self, topic: str, at: Ns, message: Message, offer: Offer = NO_OFFER) -> None:
+    def write(self, topic: str, at: Ns, message: RosMessage, offer: Offer = NO_OFFER) -> None:
         """Add a message at time `at`, ns, of a connection with this offer.
 
         Raises ``UsageError`` if this format does not support its type.
@@ -401,13 +413,13 @@ class _Writer:
         self._writer = writer
         self._types: dict[str, str] = {}
         self._own: dict[tuple[str, str, Offer], Connection] = {}
-        self._copied: dict[Source, tuple[Connection, Callable[[bytes], bytes]]] = {}
+        self._copied: dict[RecordedTopic, tuple[Connection, Callable[[bytes], bytes]]] = {}
         try:
             writer.open()
         except (Writer1Error, Writer2Error, OSError) as error:
             raise UsageError(f"{path} cannot be written: {error}") from error
 
-    def write(self, topic: str, at: Ns, message: Message, offer: Offer = NO_OFFER) -> None:
+    def write(self, topic: str, at: Ns, message: RosMessage, offer: Offer = NO_OFFER) -> None:
         """Add a message."""
         name = message.__msgtype__
         if self._types.setdefault(topic, name) != name:
@@ -451,7 +463,7 @@ class _Writer:
         """Return how messages that cannot be decoded are written; raise ``UsageError`` if they cannot be."""
         raise UsageError(connection.problem)
 
-    def _encoded(self, message: Message) -> bytes:
+    def _encoded(self, message: RosMessage) -> bytes:
         raise NotImplementedError
 
     def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:
@@ -484,7 +496,7 @@ class Rosbag1Writer(_Writer):
     def _copy_of(self, recorded: RecordedType) -> Written:
         return recorded.for_ros1()
 
-    def _encoded(self, message: Message) -> bytes:
+    def _encoded(self, message: RosMessage) -> bytes:
         return to_ros1(message)
 
     def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:
@@ -528,7 +540,7 @@ class Rosbag2Writer(_Writer):
         text = source.definition if source.schema == "msg" else ""
         return Written(text, source.digest or _NO_HASH, bytes)
 
-    def _encoded(self, message: Message) -> bytes:
+    def _encoded(self, message: RosMessage) -> bytes:
         return to_cdr(message)
 
     def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:

@@ -64,7 +64,7 @@ def _abridging(name: str) -> Append:
 def appender(name: str, abridging: bool = False) -> Append:
     """Return the function that appends a message of type `name`, if *abridging* without long arrays."""
     message_class(name)
-    writing = _Writing(abridging)
+    writing = _AppendingSource(abridging)
     writing.fields(name, "message")
     writing.end_run()
     lines = ["missing = 0", *writing.lines, "return missing"]
@@ -88,7 +88,7 @@ def _layouts(codes: str) -> tuple[Callable[..., bytes], ...]:
     return tuple(found)
 
 
-class _Writing:
+class _AppendingSource:
     """Source of one appending function, with a run of numbers that is not written yet."""
 
     def __init__(self, abridging: bool) -> None:

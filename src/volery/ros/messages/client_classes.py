@@ -24,13 +24,13 @@ from volery.ros.messages.message import (
     BYTES,
     SEQ,
     DurationValue,
-    Field,
     Header,
-    Law,
-    Message,
-    Received,
+    MessageField,
+    ReceivedNumbers,
+    RosMessage,
     Stamp,
     TimeValue,
+    ValueEncoding,
     default_value,
     generated_copy,
     may_be_long,
@@ -54,14 +54,14 @@ _UNSET: Any = object()
 
 
 @cache
-def message_of(name: str, library: Library = "") -> type[Message]:
+def message_of(name: str, library: Library = "") -> type[RosMessage]:
     """Return a client library's class of a message type; raise ``UsageError`` if the type is unknown."""
     of_graph = message_class(name)
     if not library:
         return of_graph
     if of_graph.__msgtype__ != name:
         return message_of(of_graph.__msgtype__, library)
-    return cast("type[Message]", _rospy_class(of_graph) if library == ROSPY else _rclpy_class(of_graph))
+    return cast("type[RosMessage]", _rospy_class(of_graph) if library == ROSPY else _rclpy_class(of_graph))
 
 
 @cache
@@ -101,7 +101,7 @@ def adopt(message: Any, library: Library) -> Any:
 
     Only for a message of the caller alone.
     """
-    if library and isinstance(message, Message):
+    if library and isinstance(message, RosMessage):
         cls: Any = message_of(message.__msgtype__, library)
         cls._adopt(message)
     return message
@@ -144,34 +144,36 @@ def _derived(
     return made
 
 
-def _fields(of_graph: Any) -> list[Field]:
+def _fields(of_graph: Any) -> list[MessageField]:
     return list(of_graph.fields_of)
 
 
 @cache
-def bounded_fields(cls: Any) -> tuple[Field, ...]:
+def bounded_fields(cls: Any) -> tuple[MessageField, ...]:
     """Return the fields of a message class that are sequences with a bound, or contain some."""
-    return tuple(one for one in _fields(cls) if one.bound or (one.nested and bounded_fields(one.nested)))
+    return tuple(
+        field for field in _fields(cls) if field.bound or (field.nested and bounded_fields(field.nested))
+    )
 
 
-def beyond_bound(message: Any, fields: tuple[Field, ...]) -> str:
+def beyond_bound(message: Any, fields: tuple[MessageField, ...]) -> str:
     """Return which sequence of a message is longer than its definition allows, or an empty string.
 
     Fast DDS of Jazzy and Kilted refuses such a message; a string may be longer than its bound.
     """
-    for one in fields:
-        value = getattr(message, one.name)
-        if one.bound and len(value) > one.bound:
-            return f"{one.name} has {len(value)} items, at most {one.bound} are allowed"
-        inner = bounded_fields(one.nested) if one.nested else ()
-        for item in () if not inner else value if one.length is not None else (value,):
+    for field in fields:
+        value = getattr(message, field.name)
+        if field.bound and len(value) > field.bound:
+            return f"{field.name} has {len(value)} items, at most {field.bound} are allowed"
+        inner = bounded_fields(field.nested) if field.nested else ()
+        for item in () if not inner else value if field.length is not None else (value,):
             found = beyond_bound(item, inner)
             if found:
-                return f"{one.name}.{found}"
+                return f"{field.name}.{found}"
     return ""
 
 
-class _Source:
+class _FunctionSource:
     """Source of a function with its names."""
 
     def __init__(self) -> None:
@@ -204,37 +206,37 @@ def _adopting(cls: Any) -> Callable[[Any], Any]:
 @cache
 def _adoption(cls: Any) -> Callable[[Any], Any]:
     """Return what makes a message of the graph one of *cls*, a class of a client library."""
-    writing = _Source()
+    writing = _FunctionSource()
     _write_adoption(writing, cls, "message", cls.client_library)
     made: Callable[[Any], Any] = writing.function("message", f"reception of {cls.__msgtype__}")
     return made
 
 
-def _write_adoption(writing: _Source, cls: Any, of: str, library: Library) -> None:
+def _write_adoption(writing: _FunctionSource, cls: Any, of: str, library: Library) -> None:
     writing.lines.append(f"{of}.__class__ = {writing.name(cls)}")
-    for one in _fields(cls):
-        inner: Any = message_of(one.nested.__msgtype__, library) if one.nested else None
-        if one.length is not None:
+    for field in _fields(cls):
+        inner: Any = message_of(field.nested.__msgtype__, library) if field.nested else None
+        if field.length is not None:
             if inner is not None:
                 # the class attribute, since the first call replaces it
-                writing.lines.append(f"for item in {of}.{one.name}: {writing.name(inner)}._adopt(item)")
-            elif one.base != "string" and not _as_numpy(one, library):
-                slot = slot_of(cls, one.name)
+                writing.lines.append(f"for item in {of}.{field.name}: {writing.name(inner)}._adopt(item)")
+            elif field.base != "string" and not _as_numpy(field, library):
+                slot = slot_of(cls, field.name)
                 get, put = writing.name(slot.__get__), writing.name(slot.__set__)
                 writing.lines.append(f"{put}({of}, {writing.name(_boxed)}({get}({of})))")
         elif inner is not None:
             part = f"part_{len(writing.lines)}"
-            writing.lines.append(f"{part} = {of}.{one.name}")
+            writing.lines.append(f"{part} = {of}.{field.name}")
             _write_adoption(writing, inner, part, library)
     if of == "message":
         writing.lines.append("return message")
 
 
 def _boxed(value: Any) -> Any:
-    return Received(value) if isinstance(value, np.ndarray) else value
+    return ReceivedNumbers(value) if isinstance(value, np.ndarray) else value
 
 
-def _as_numpy(one: Field, library: Library) -> bool:
+def _as_numpy(one: MessageField, library: Library) -> bool:
     """Return whether a client library has a list of numbers as numpy array, as the graph has.
 
     A long one of the graph cannot be written.
@@ -247,14 +249,16 @@ def _as_numpy(one: Field, library: Library) -> bool:
     )
 
 
-def _converting(cls: Any, one: Field, convert: Callable[[Any], Any], put: Callable[[Any], Any] | None) -> Any:
+def _converting(
+    cls: Any, one: MessageField, convert: Callable[[Any], Any], put: Callable[[Any], Any] | None
+) -> Any:
     """Return the property of a list of numbers; *put* is applied to what is assigned."""
     slot = slot_of(cls, one.name)
     get, assign = slot.__get__, slot.__set__
 
     def read(self: Any) -> Any:
         value = get(self)
-        if value.__class__ is Received:
+        if value.__class__ is ReceivedNumbers:
             value = convert(value.array)
             assign(self, value)
         return value
@@ -300,7 +304,7 @@ def _rospy_class(of_graph: Any) -> Any:
     label = ros1_name(name).rpartition("/")[2].replace("_Request", "Request").replace("_Response", "Response")
     fields = _fields(of_graph)
     renamed = _ROS1_FIELDS.get(name, {})
-    shown = [one for one in fields if renamed.get(one.name, one.name)]
+    shown = [field for field in fields if renamed.get(field.name, field.name)]
     slots = [renamed.get(one.name, one.name) for one in shown]
     types = [_ros1_type_of(one) for one in shown]
     bases: tuple[type, ...] = (_RospyMessage,)
@@ -337,9 +341,9 @@ def _rospy_class(of_graph: Any) -> Any:
 def numpy_class(cls: Any) -> Any:
     """Return ``rospy.numpy_msg.numpy_msg(cls)``: its received lists of numbers are numpy arrays."""
     members = {
-        one.name: _converting(cls, one, np.copy, None)
-        for one in _fields(cls)
-        if one.length is not None and one.nested is None and one.base not in ("string", "uint8", "char")
+        field.name: _converting(cls, field, np.copy, None)
+        for field in _fields(cls)
+        if field.length is not None and field.nested is None and field.base not in ("string", "uint8", "char")
     }
     label = f"Numpy_{cls._type.replace('/', '__')}"
     namespace = {"__slots__": (), "__module__": "rospy.numpy_msg", "client_library": ROSPY, **members}
@@ -362,7 +366,7 @@ class _Renamed:
         setattr(instance, self._ours, value)
 
 
-def _ros1_type_of(one: Field) -> str:
+def _ros1_type_of(one: MessageField) -> str:
     base = ros1_name(one.nested.__msgtype__) if one.nested else one.base.replace("octet", "byte")
     base = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}.get(base, base)
     return base if one.length is None else f"{base}[{one.length or ''}]"
@@ -376,11 +380,11 @@ def _as_tuple(base: str, values: Any) -> Any:
 
 
 def _rospy_init(
-    cls: Any, of_graph: Any, fields: list[Field], slots: list[str], renamed: dict[str, str]
+    cls: Any, of_graph: Any, fields: list[MessageField], slots: list[str], renamed: dict[str, str]
 ) -> Callable[..., None]:
     """Return ``__init__``: no arguments, all fields in order, or some by name; None means the default."""
-    writing = _Source()
-    defaults = {renamed.get(one.name) or one.name: _rospy_default(one) for one in fields}
+    writing = _FunctionSource()
+    defaults = {renamed.get(field.name) or field.name: _rospy_default(field) for field in fields}
     if "seq" in slots:
         defaults["seq"] = "0"
     for key, value in list(defaults.items()):
@@ -411,7 +415,7 @@ def _rospy_init(
     return init
 
 
-def _rospy_default(one: Field) -> Any:
+def _rospy_default(one: MessageField) -> Any:
     """Return the source of a field's default, or what makes it."""
     if one.nested is not None:
         nested = message_of(one.nested.__msgtype__, ROSPY)
@@ -467,7 +471,7 @@ class _RospyMessage:
 
     def _encoded(self) -> bytes:
         try:
-            return to_ros1(cast("Message", self))
+            return to_ros1(cast("RosMessage", self))
         except UsageError as error:
             raise SerializationError(str(error)) from error
 
@@ -513,7 +517,7 @@ def _yaml(value: Any, indent: str = "") -> str:
     """Return a value of a message as rospy prints it."""
     if isinstance(value, Stamp):
         return f"{indent}secs: {value.secs}\n{indent}nsecs: {value.nsecs:9d}"
-    if isinstance(value, _RospyMessage | Message):
+    if isinstance(value, _RospyMessage | RosMessage):
         names = type(value).__slots__ if isinstance(value, _RospyMessage) else value.__match_args__
         return "\n".join(
             f"{indent}{name}: {_yaml_inside(getattr(value, name), indent)}" for name in cast("Any", names)
@@ -524,17 +528,17 @@ def _yaml(value: Any, indent: str = "") -> str:
 
 
 def _yaml_inside(value: Any, indent: str) -> str:
-    if isinstance(value, Message):
+    if isinstance(value, RosMessage):
         return f"\n{_yaml(value, indent + '  ')}"
     if isinstance(value, bytes | list | tuple | np.ndarray):
         values = list(value)
         if not values:
             return "[]"
         inner = indent + "  "
-        if isinstance(values[0], Stamp | Message):
-            return "".join(f"\n{inner}- \n{_yaml(one, inner + '  ')}" for one in values)
+        if isinstance(values[0], Stamp | RosMessage):
+            return "".join(f"\n{inner}- \n{_yaml(value, inner + '  ')}" for value in values)
         if isinstance(values[0], str):
-            return "".join(f"\n{inner}- {one}" for one in values)
+            return "".join(f"\n{inner}- {value}" for value in values)
         return str(values)
     return _yaml(value)
 
@@ -738,7 +742,7 @@ def take_odd_values(message: Any) -> list[Odd]:
     """Return what copying *message* has sent otherwise than given."""
     if not odd_values:
         return []
-    found = [one for one in odd_values if one.message is message]
+    found = [value for value in odd_values if value.message is message]
     odd_values.clear()
     return found
 
@@ -789,7 +793,7 @@ def _as_c_double(value: Any) -> float:
     return float(struct.unpack("<d", data)[0])
 
 
-_C = Law(_c_number, infinite=True, wraps=True)
+_C = ValueEncoding(_c_number, infinite=True, wraps=True)
 
 
 def _rclpy_class(of_graph: Any) -> Any:
@@ -814,12 +818,12 @@ def _rclpy_class(of_graph: Any) -> Any:
         members |= {one: _Absent() for one in shown}
         members |= {one: getattr(object, one) for one in ("__lt__", "__le__", "__gt__", "__ge__")}
         operators = ("add", "radd", "sub", "neg", "abs", "mul", "rmul", "truediv", "bool")
-        members |= {f"__{one}__": None for one in operators if hasattr(of_graph, f"__{one}__")}
+        members |= {f"__{operator}__": None for operator in operators if hasattr(of_graph, f"__{operator}__")}
         members["__bool__"] = lambda _: True
     module = generated_module(f"{package}/{kind}/{label}")
     members["SLOT_TYPES"] = _Lazy(lambda _: slot_types(of_graph.__msgtype__))
     made = _derived(of_graph, label, module, RCLPY, (_RclpyMessage,), members)
-    made.__slots__ = [*(f"_{one.name}" for one in fields), "_check_fields"]
+    made.__slots__ = [*(f"_{field.name}" for field in fields), "_check_fields"]
     for constant, value in _byte_constants(of_graph):
         setattr(made, constant, value)
     made.__init__ = _rclpy_init(made, of_graph, fields)
@@ -832,7 +836,7 @@ def _byte_constants(of_graph: Any) -> list[tuple[str, bytes]]:
     return [(name, bytes([value])) for name, base, value in found if base in BYTES and isinstance(value, int)]
 
 
-def _rclpy_list(of_graph: Any, one: Field) -> Any:
+def _rclpy_list(of_graph: Any, one: MessageField) -> Any:
     if one.base not in _CODES:  # bool and byte
         as_list = (
             (lambda values: [bytes([item]) for item in values]) if one.base in BYTES else np.ndarray.tolist
@@ -859,10 +863,10 @@ def _rclpy_list(of_graph: Any, one: Field) -> Any:
 
 
 def _as_bytes(values: Any) -> list[bytes]:
-    return [bytes([one]) for one in values]
+    return [bytes([value]) for value in values]
 
 
-def _rclpy_byte(of_graph: Any, one: Field) -> Any:
+def _rclpy_byte(of_graph: Any, one: MessageField) -> Any:
     slot = slot_of(of_graph, one.name)
 
     def read(self: Any) -> Any:
@@ -872,26 +876,26 @@ def _rclpy_byte(of_graph: Any, one: Field) -> Any:
     return property(read, slot.__set__)
 
 
-def _rclpy_init(cls: Any, of_graph: Any, fields: list[Field]) -> Callable[..., None]:
+def _rclpy_init(cls: Any, of_graph: Any, fields: list[MessageField]) -> Callable[..., None]:
     """Return ``__init__``, which takes fields by name and ignores what is none, as rclpy's does."""
-    writing = _Source()
+    writing = _FunctionSource()
     head = ["self"]
-    for one in fields:
-        default = default_value(of_graph.__msgtype__, one)
-        if one.nested is not None and one.length is None:
-            default = message_of(one.nested.__msgtype__, RCLPY)
-        elif one.nested is not None:
-            nested, count = message_of(one.nested.__msgtype__, RCLPY), one.length or 0
+    for field in fields:
+        default = default_value(of_graph.__msgtype__, field)
+        if field.nested is not None and field.length is None:
+            default = message_of(field.nested.__msgtype__, RCLPY)
+        elif field.nested is not None:
+            nested, count = message_of(field.nested.__msgtype__, RCLPY), field.length or 0
             default = partial(_several, nested, count)
-        elif one.length is not None and one.base not in (*_CODES, "string"):  # lists of bool and byte
-            default = partial(_several, bytes if one.base in BYTES else bool, one.length)
+        elif field.length is not None and field.base not in (*_CODES, "string"):  # lists of bool and byte
+            default = partial(_several, bytes if field.base in BYTES else bool, field.length)
         if callable(default):
             made = writing.name(default)
-            head.append(f"{one.name}=unset")
-            writing.lines.append(f"self.{one.name} = {made}() if {one.name} is unset else {one.name}")
+            head.append(f"{field.name}=unset")
+            writing.lines.append(f"self.{field.name} = {made}() if {field.name} is unset else {field.name}")
         else:
-            head.append(f"{one.name}={writing.name(default)}")
-            writing.lines.append(f"self.{one.name} = {one.name}")
+            head.append(f"{field.name}={writing.name(default)}")
+            writing.lines.append(f"self.{field.name} = {field.name}")
     if issubclass(of_graph, Header):
         writing.lines.append(f"self.{SEQ} = 0")
     if fields:

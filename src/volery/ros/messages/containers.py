@@ -138,7 +138,7 @@ class Offer(NamedTuple):
 NO_OFFER = Offer()
 
 
-class Source(NamedTuple):
+class RecordedTopic(NamedTuple):
     """A connection as a recording states it: a topic, and the type, encoding and definition of its messages.
 
     Attributes:
@@ -164,14 +164,14 @@ class RawMessage(NamedTuple):
     """An encoded message of a recording, with its connection."""
 
     at: Ns
-    source: Source
+    source: RecordedTopic
     data: bytes
 
 
 _LANGUAGES = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
 
 
-def source_of(connection: Connection) -> Source:
+def source_of(connection: Connection) -> RecordedTopic:
     """Return a connection of rosbags' readers."""
     ext, name = connection.ext, connection.msgtype
     if isinstance(ext, ConnectionExtRosbag2):
@@ -181,12 +181,12 @@ def source_of(connection: Connection) -> Source:
         encoding, offer = "ros1", Offer(bool(ext.latching), ext.callerid or "")
         name = our_name(name.replace("/msg/", "/"))
     language, text = _LANGUAGES.get(connection.msgdef.format, ""), connection.msgdef.data
-    return Source(connection.topic, name, encoding, language, text, connection.digest, offer)
+    return RecordedTopic(connection.topic, name, encoding, language, text, connection.digest, offer)
 
 
 def is_latched(profiles: Collection[Qos]) -> bool:
     """Return whether one of the profiles keeps messages for late subscribers."""
-    return any(one.durability == QosDurability.TRANSIENT_LOCAL for one in profiles)
+    return any(profile.durability == QosDurability.TRANSIENT_LOCAL for profile in profiles)
 
 
 # -- rosbag 1
@@ -194,7 +194,7 @@ def is_latched(profiles: Collection[Qos]) -> bool:
 
 def recover_rosbag1(path: Path) -> Iterator[RawMessage]:
     """Yield the complete messages of a rosbag of format 2.0, in the order of the file."""
-    connections: dict[bytes, Source] = {}
+    connections: dict[bytes, RecordedTopic] = {}
     with path.open("rb") as file:
         file.readline()
         for header, data in _records(file):
@@ -211,7 +211,7 @@ def _kind(header: dict[str, bytes]) -> int:
 
 
 def _rosbag1_message(
-    header: dict[str, bytes], data: bytes, connections: dict[bytes, Source]
+    header: dict[str, bytes], data: bytes, connections: dict[bytes, RecordedTopic]
 ) -> RawMessage | None:
     kind = _kind(header)
     number, stamp = header.get("conn", b""), header.get("time", b"")
@@ -223,7 +223,7 @@ def _rosbag1_message(
         offer = Offer(fields.get("latching") == "1", fields.get("callerid", ""))
         text, sum_ = fields.get("message_definition", ""), fields.get("md5sum", "")
         name = our_name(fields.get("type", ""))
-        connections[number] = Source(fields["topic"], name, "ros1", "msg", text, sum_, offer)
+        connections[number] = RecordedTopic(fields["topic"], name, "ros1", "msg", text, sum_, offer)
     connection = connections.get(number)
     if kind != _MESSAGE or connection is None or len(stamp) != _STAMP.size:
         return None
@@ -312,7 +312,7 @@ def recover_mcap(path: Path, damage: list[str]) -> Iterator[RawMessage]:
         damage: What is damaged or missing is added to it.
     """
     schemas: dict[int, Schema] = {}
-    sources: dict[int, Source] = {}
+    sources: dict[int, RecordedTopic] = {}
     ended = False
     with path.open("rb") as file:
         try:
@@ -382,7 +382,7 @@ class McapStorage:
             raise NotIndexedError("it has no index")
         statistics = summary.statistics
         counts = statistics.channel_message_counts
-        if any(one not in summary.channels for one in counts) or (counts and not summary.chunk_indexes):
+        if any(count not in summary.channels for count in counts) or (counts and not summary.chunk_indexes):
             raise NotIndexedError("its index is not complete")
         self._chunks = sorted(summary.chunk_indexes, key=lambda one: one.message_start_time)
         self.connections = [
@@ -405,7 +405,7 @@ class McapStorage:
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, time and bytes of the messages in order of time, decompressing as it goes."""
-        wanted = {one.id: one for one in connections}
+        wanted = {connection.id: connection for connection in connections}
         waiting: list[tuple[int, int, Connection, bytes]] = []
         count = 0
         for chunk in self._chunks:
@@ -439,7 +439,7 @@ class _Folder(DirectoryReader):
         """Open the files, and give their connections the QoS and the checksum that the metadata states."""
         super().open()
         for storage in self.storages:
-            storage.connections = [self._aligned(one) for one in storage.connections]
+            storage.connections = [self._aligned(connection) for connection in storage.connections]
 
     def _aligned(self, stored: Connection) -> Connection:
         same = [
@@ -451,7 +451,7 @@ class _Folder(DirectoryReader):
             if one.ext == stored.ext:
                 return stored._replace(digest=one.digest)
         if not same:
-            number = max((one.id for one in self.connections), default=0) + 1
+            number = max((connection.id for connection in self.connections), default=0) + 1
             self.connections.append(stored._replace(id=number, owner=self))
             return stored
         place, stated = same[0]

@@ -66,9 +66,9 @@ class Conversion:
         self._own_left_out: dict[str, None] = {}
         theirs = [(label, what) for label, what in source.fielddefs[name][1] if label != FILLER]
         ours = [(label, what) for label, what in target.fielddefs[name][1] if label != FILLER]
-        theirs = [one for one in theirs if not self._counts(one[0])]
+        theirs = [their for their in theirs if not self._counts(their[0])]
         self._fields = self._matched(theirs, ours)
-        taken = {one.source for one in self._fields}
+        taken = {field.source for field in self._fields}
         self._missing = [label for label, _ in theirs if label not in taken]
         plain = [(label, one.source) for (label, _), one in zip(ours, self._fields, strict=True)]
         in_place = [one for _, one in plain if one] == [label for label, _ in theirs if label in taken]
@@ -93,9 +93,9 @@ class Conversion:
     def filled(self) -> tuple[str, ...]:
         """Return the fields that get their default."""
         own = [
-            f"{self._label}.{one.name}"
-            for one in self._fields
-            if one.source is None and not self._counts(one.name)
+            f"{self._label}.{field.name}"
+            for field in self._fields
+            if field.source is None and not self._counts(field.name)
         ]
         inner = [one for nested in self._nested.values() for one in nested.filled]
         return tuple(dict.fromkeys([*own, *inner]))
@@ -115,16 +115,16 @@ class Conversion:
             if not self._is_default(dict(self._source.fielddefs[self._name][1])[label], value):
                 self._own_left_out[f"{self._label}.{label}"] = None
         values = {}
-        for one in self._fields:
-            name = rosbags.normalize_fieldname(one.name)
-            if one.source is not None and one.convert is not None:
-                value = getattr(message, rosbags.normalize_fieldname(one.source))
+        for field in self._fields:
+            name = rosbags.normalize_fieldname(field.name)
+            if field.source is not None and field.convert is not None:
+                value = getattr(message, rosbags.normalize_fieldname(field.source))
                 try:
-                    values[name] = one.convert(value)
+                    values[name] = field.convert(value)
                 except (ValueError, TypeError, OverflowError) as error:
-                    raise UsageError(f"{self._name}.{one.name}: {value!r} does not fit: {error}") from error
+                    raise UsageError(f"{self._name}.{field.name}: {value!r} does not fit: {error}") from error
             else:
-                values[name] = self._default(dict(self._target.fielddefs[self._name][1])[one.name])
+                values[name] = self._default(dict(self._target.fielddefs[self._name][1])[field.name])
         return self._make(self._name)(**values)
 
     # -- how fields correspond
@@ -158,7 +158,9 @@ class Conversion:
             base = item[1][0]
             return lambda values: _array(values, base, count)
         convert = self._single(detail[0], item)
-        return None if convert is None else lambda values: _counted([convert(one) for one in values], count)
+        return (
+            None if convert is None else lambda values: _counted([convert(value) for value in values], count)
+        )
 
     def _single(self, theirs: Any, ours: Any) -> Convert | None:
         (kind, detail), (our_kind, our_detail) = theirs, ours

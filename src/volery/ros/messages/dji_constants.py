@@ -13,7 +13,7 @@ HEALTHY_GPS = 4
 """Least ``gps_health`` at which position, velocity and the local reference are reliable."""
 
 
-class Source(NamedTuple):
+class DocumentedBehaviour(NamedTuple):
     """A behaviour of the aircraft that is documented, and by whom."""
 
     what: str
@@ -134,20 +134,20 @@ SETPOINT_TOPICS: Mapping[str, int] = {
 """Flags of the set-point topics; other flags use the topic ``...generic``."""
 
 
-class Range(NamedTuple):
+class ClosedInterval(NamedTuple):
     """Closed interval."""
 
     lowest: float
     highest: float
 
 
-SETPOINT_HEIGHTS = Range(0.0, 120.0)
+SETPOINT_HEIGHTS = ClosedInterval(0.0, 120.0)
 """Heights of set-points, m above the take-off point."""
 
-GO_HOME_ALTITUDES = Range(20.0, 500.0)
+GO_HOME_ALTITUDES = ClosedInterval(20.0, 500.0)
 """Heights of the flight home that a program may set, m above home; assumed."""
 
-MISSION_SPEEDS = Range(2.0, 15.0)
+MISSION_SPEEDS = ClosedInterval(2.0, 15.0)
 """Speeds of a waypoint mission, m/s."""
 
 

@@ -21,7 +21,7 @@ from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, abridged, encode, encoded
 from volery.ros.messages.conversion import FILLER, HEADER, Conversion
-from volery.ros.messages.message import DEFAULTS, Message
+from volery.ros.messages.message import DEFAULTS, RosMessage
 from volery.ros.messages.store import ROS1_SPELLING, message_class, message_name, service, service_name, store
 
 
@@ -42,22 +42,22 @@ def _has_lists(name: str) -> bool:
     return False
 
 
-def to_cdr(message: Message) -> bytes:
+def to_cdr(message: RosMessage) -> bytes:
     """Encode a message; raise ``UsageError`` if a value does not fit its field."""
     if type(message) is not message.of_graph or _has_lists(message.__msgtype__):
         message = message.copy()
     return copied_to_cdr(message)
 
 
-def copied_to_cdr(message: Message) -> bytes:
-    """Encode a message that ``Message.copy`` has returned, without preparing it again."""
+def copied_to_cdr(message: RosMessage) -> bytes:
+    """Encode a message that ``RosMessage.copy`` has returned, without preparing it again."""
     try:
         return bytes(encoded(message))
     except _MISFITS as error:
         raise _misfit(message, error) from error
 
 
-def abridged_cdr(message: Message) -> tuple[bytearray, int]:
+def abridged_cdr(message: RosMessage) -> tuple[bytearray, int]:
     """Return what ``copied_to_cdr`` does without the content of long arrays, and how many bytes are missing.
 
     An array is long from ``message.LONG`` bytes on; nothing is missing of a message without one.
@@ -68,7 +68,7 @@ def abridged_cdr(message: Message) -> tuple[bytearray, int]:
         raise _misfit(message, error) from error
 
 
-def encoded_size(message: Message) -> int:
+def encoded_size(message: RosMessage) -> int:
     """Return the number of bytes of ``copied_to_cdr``; a value that does not fit raises as there."""
     try:
         data, missing = abridged(message)
@@ -81,7 +81,7 @@ _MISFITS = (struct.error, OverflowError, TypeError, ValueError, AttributeError)
 """What encoding a value that does not fit its field raises."""
 
 
-def _misfit(message: Message, error: Exception) -> UsageError:
+def _misfit(message: RosMessage, error: Exception) -> UsageError:
     return UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}")
 
 
@@ -135,7 +135,7 @@ _REMEMBERED = 4096
 """Sizes that are kept at most: clouds of points differ in length without end."""
 
 
-def cdr_size(message: Message) -> int:
+def cdr_size(message: RosMessage) -> int:
     """Return the number of bytes that ``copied_to_cdr`` gives; what has a known size is not encoded."""
     name = message.__msgtype__
     fixed = _fixed_size(name)
@@ -154,12 +154,12 @@ def cdr_size(message: Message) -> int:
     return size
 
 
-def _culprit(message: Message) -> str:
+def _culprit(message: RosMessage) -> str:
     """Describe the first field whose value cannot be encoded."""
     for label, (kind, detail) in store().fielddefs[message.__msgtype__][1]:
         value: Any = getattr(message, label, None)
         if kind == rosbags.Nodetype.NAME:
-            if getattr(value, "__msgtype__", None) != detail and not isinstance(value, Message):
+            if getattr(value, "__msgtype__", None) != detail and not isinstance(value, RosMessage):
                 return f"{label} is {value!r}, not a {detail}"
             deeper = _culprit(value)
             if deeper != _UNKNOWN:
@@ -339,7 +339,7 @@ def _hashed_type(what: Any) -> str:
     return f"{_hashed_type(inner)}[{count if kind == rosbags.Nodetype.ARRAY else ''}]"
 
 
-def to_ros1(message: Message) -> bytes:
+def to_ros1(message: RosMessage) -> bytes:
     """Encode a message for ROS 1; raise ``UsageError`` if a value does not fit its field."""
     return cdr_to_ros1(message.__msgtype__, to_cdr(message))
 
@@ -394,7 +394,7 @@ class Constant(NamedTuple):
     value: Any
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """A message type: full name (``package/msg/Name``), ROS 1 name (``package/Name``), and its parts."""
 
     name: str
@@ -403,25 +403,25 @@ class Layout(NamedTuple):
     fields: tuple[FieldLayout, ...]
 
 
-def ros1_layout(name: str) -> Layout:
+def ros1_layout(name: str) -> MessageLayout:
     """Return a message type's layout in ROS 1, or ours where it differs; ``UsageError`` if it is unknown."""
     full = message_name(name)
     message_class(full)
     return _layout(full, definition_store(full) if _to_noetic(full).same_bytes else store())
 
 
-def ros2_layout(name: str) -> Layout:
+def ros2_layout(name: str) -> MessageLayout:
     """Return a message type's layout in ROS 2; ``UsageError`` if it is unknown."""
     full = message_name(name)
     message_class(full)
     found = _layout(full, store())
-    fields = tuple(one._replace(default=DEFAULTS.get((full, one.name))) for one in found.fields)
+    fields = tuple(field._replace(default=DEFAULTS.get((full, field.name))) for field in found.fields)
     return found._replace(fields=fields)
 
 
-def _layout(full: str, of: rosbags.Typestore) -> Layout:
+def _layout(full: str, of: rosbags.Typestore) -> MessageLayout:
     constants, fields = of.fielddefs[full]
-    return Layout(
+    return MessageLayout(
         full,
         ros1_name(full),
         tuple(Constant(label, base, value) for label, base, value in constants),

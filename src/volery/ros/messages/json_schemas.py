@@ -45,18 +45,18 @@ class _Member(NamedTuple):
 
 def ros_name_of(schema: str) -> str:
     """Return the type's full name for a schema: ``foxglove/msg/Log`` for ``foxglove.Log``."""
-    parts = [one for one in re.split(r"[./]|::", schema) if one not in ("", "msg")]
+    parts = [word for word in re.split(r"[./]|::", schema) if word not in ("", "msg")]
     label = _camel(parts[-1]) if parts else ""
     package = "_".join(_words("_".join(parts[:-1]))) or "json"
     return f"{package if package[0].isalpha() else f'json_{package}'}/msg/{label or 'Message'}"
 
 
 def _words(name: str) -> list[str]:
-    return [one.lower() for one in _WORD_ENDS.split(name) if one]
+    return [word.lower() for word in _WORD_ENDS.split(name) if word]
 
 
 def _camel(name: str) -> str:
-    made = "".join(one.capitalize() for one in _words(name))
+    made = "".join(word.capitalize() for word in _words(name))
     return made if not made or made[0].isalpha() else f"N{made}"
 
 
@@ -129,8 +129,8 @@ class JsonType:
         if reference not in self._by_reference:
             self._by_reference[reference] = None
             found: Any = self._schema
-            for one in reference.removeprefix("#").strip("/").split("/"):
-                key = one.replace("~1", "/").replace("~0", "~")
+            for word in reference.removeprefix("#").strip("/").split("/"):
+                key = word.replace("~1", "/").replace("~0", "~")
                 found = found.get(key) if isinstance(found, dict) else None
             label = f"{self._label}{_camel(reference.rpartition('/')[2])}"
             self._by_reference[reference] = self._type_of(label, found)
@@ -149,12 +149,12 @@ class JsonType:
         for key, inner in properties.items():
             name = "_".join(_words(key)) or "field"
             name = name if name[0].isalpha() else f"n{name}"
-            while any(one.name == name for one in members):
+            while any(member.name == name for member in members):
                 name += "x"
             members.append(_Member(key, name, *self._type_of(f"{label}{_camel(key)}", inner)))
         if not members:
             members = [_Member("", TEXT_FIELD, "string", json.dumps)]
-        self._texts[label] = "".join(f"{one.type} {one.name}\n" for one in members)
+        self._texts[label] = "".join(f"{member.type} {member.name}\n" for member in members)
         return f"{self._package}/{label}", lambda value: self._message(label, members, value)
 
     # -- values
@@ -170,7 +170,7 @@ class JsonType:
         if value is not None and not isinstance(value, dict):
             raise UsageError(f"{label}: {_short(value)} is no object")
         value = value or {}
-        known = {one.key for one in members}
+        known = {member.key for member in members}
         self.left_out.update({f"{label}.{key}": None for key in value if key not in known})
         fields = {}
         for one in members:

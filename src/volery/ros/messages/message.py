@@ -30,7 +30,7 @@ _MISFITS = (TypeError, ValueError, AttributeError, OverflowError, struct.error)
 """What a value that does not fit its field raises."""
 
 
-class Received:
+class ReceivedNumbers:
     """A list of numbers as the graph delivered it; a client library converts it when it is read first."""
 
     __slots__ = ("array",)
@@ -39,7 +39,7 @@ class Received:
         self.array = array
 
 
-class Law(NamedTuple):
+class ValueEncoding(NamedTuple):
     """How a client library encodes single values of other types than their field's.
 
     Attributes:
@@ -67,15 +67,15 @@ def plain_number(base: str, value: Any, message: Any, path: str) -> Any:
     return int(index(value))
 
 
-PLAIN = Law(plain_number)
+PLAIN = ValueEncoding(plain_number)
 
 
-def generated_copy(cls: Any, fields: list[Any], law: Law = PLAIN) -> Copy:
+def generated_copy(cls: Any, fields: list[Any], law: ValueEncoding = PLAIN) -> Copy:
     """Return the method ``copy`` of a message class; its result is of the graph's classes.
 
     Generated code takes half the time of a loop over the fields.
     """
-    writing = _Writing(law)
+    writing = _CopyingSource(law)
     made = writing.expression(cls, fields, "self", "")
     return _compiled(f"copy of {cls.__msgtype__}", [*writing.lines, f"return {made}"], writing.names)
 
@@ -109,16 +109,16 @@ def _singles(infinite: bool, *values: float) -> tuple[float, ...]:
         if not infinite:
             raise
         with np.errstate(over="ignore"):
-            return tuple(float(np.float32(one)) for one in values)
+            return tuple(float(np.float32(value)) for value in values)
 
 
 _SINGLE = [struct.Struct(f"<{count}f") for count in range(12)]
 
 
-class _Writing:
+class _CopyingSource:
     """Source of one copying function; nested messages and numbers are assigned to variables first."""
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: ValueEncoding) -> None:
         self.law = law
         self.lines: list[str] = []
         self.names: dict[str, Any] = {"number": law.number, "singles": partial(_singles, law.infinite)}
@@ -213,7 +213,7 @@ Default = Callable[[], Any]
 Copier = Callable[[Any], Any]
 
 
-class Message:
+class RosMessage:
     """A ROS message; ``__msgtype__`` is its type's name, ``__match_args__`` the names of its fields."""
 
     __slots__ = ("connection_of",)
@@ -225,7 +225,7 @@ class Message:
     _copied: ClassVar[Callable[[Any], Any]]
     of_graph: ClassVar[Any]
     """Class of the type on the graph; a client library's is derived from it. Private to this package."""
-    fields_of: ClassVar[list[Field]] = []
+    fields_of: ClassVar[list[MessageField]] = []
     """Fields of the type. Private to this package."""
     constants_of: ClassVar[Sequence[tuple[str, str, Any]]] = ()
     """Name, kind and value of the type's constants. Private to this package."""
@@ -258,13 +258,13 @@ class Message:
             except _MISFITS as error:
                 name = f"{cls.__msgtype__}.{cls.__match_args__[place]}"
                 raise UsageError(f"{name}: {copied[place]!r} does not fit: {error}") from error
-        made = cls.of_graph(*copied)
+        graph = cls.of_graph(*copied)
         if isinstance(self, Header):
-            made.seq = self.seq
-        return made
+            graph.seq = self.seq
+        return graph
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Message) or other.__msgtype__ != self.__msgtype__:
+        if not isinstance(other, RosMessage) or other.__msgtype__ != self.__msgtype__:
             return NotImplemented
         return all(_same(getattr(self, name), getattr(other, name)) for name in self.__match_args__)
 
@@ -279,7 +279,7 @@ SEQ = "ros1_seq"
 """Slot of a header in which ``seq`` is kept."""
 
 
-class Header(Message):
+class Header(RosMessage):
     """A header. ROS 1's ``seq`` is carried on the embedded graph; ROS 2 has no such field."""
 
     __slots__ = ()
@@ -294,7 +294,7 @@ class Header(Message):
         setattr(self, SEQ, value)
 
 
-class Nothing(Message):
+class Nothing(RosMessage):
     """A type without fields; its encoding has one unused byte."""
 
     __slots__ = ()
@@ -307,7 +307,7 @@ DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1
 """Defaults that definitions of ROS 2 state, by type and field; all others are zero, false or empty."""
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """A field of a type: exactly one of ``base`` (a number, bool or string) and ``nested`` is given.
 
     ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array. ``bound`` is the
@@ -316,14 +316,14 @@ class Field(NamedTuple):
 
     name: str
     base: str
-    nested: type[Message] | None
+    nested: type[RosMessage] | None
     length: int | None
     bound: int = 0
 
 
 def make_class(
-    name: str, base: type[Message], constants: Sequence[tuple[str, str, Any]], fields: list[Field]
-) -> type[Message]:
+    name: str, base: type[RosMessage], constants: Sequence[tuple[str, str, Any]], fields: list[MessageField]
+) -> type[RosMessage]:
     """Create the class of message type `name` (``package/msg/Name``), derived from `base`."""
     package, kind, label = name.split("/")
     members: list[tuple[str, Any, Any]] = []
@@ -345,20 +345,20 @@ def make_class(
         "_values": staticmethod(_values_of(tuple(one.name for one in fields))),
         "fields_of": fields,
     }
-    made: Any = make_dataclass(
+    dataclass: Any = make_dataclass(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
-    setattr(made, "__match_args__", tuple(one.name for one in fields))  # noqa: B010 - fixed to mypy
-    made.of_graph = made
-    set_written(made, {"_copied": partial(generated_copy, made, fields)})
+    setattr(dataclass, "__match_args__", tuple(one.name for one in fields))  # noqa: B010 - fixed to mypy
+    dataclass.of_graph = dataclass
+    set_written(dataclass, {"_copied": partial(generated_copy, dataclass, fields)})
     set_written(
-        made,
+        dataclass,
         {
-            "copy": partial(generated_copy, made, fields),
-            "converted": partial(generated_conversion, made, fields),
+            "copy": partial(generated_copy, dataclass, fields),
+            "converted": partial(generated_conversion, dataclass, fields),
         },
     )
-    return cast("type[Message]", made)
+    return cast("type[RosMessage]", dataclass)
 
 
 def set_written(cls: Any, methods: dict[str, Callable[[], Copy]]) -> None:
@@ -386,12 +386,12 @@ def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     return get if len(names) > 1 else lambda message: (get(message),)
 
 
-def _default(owner: str, one: Field) -> Any:
+def _default(owner: str, one: MessageField) -> Any:
     default = default_value(owner, one)
     return field(default_factory=default) if callable(default) else field(default=default)
 
 
-def default_value(owner: str, one: Field) -> Any:
+def default_value(owner: str, one: MessageField) -> Any:
     """Return a field's default, or what makes it."""
     stated = DEFAULTS.get((owner, one.name))
     if one.length is None:
@@ -424,7 +424,7 @@ def may_be_long(base: str, length: int) -> bool:
     return not length or length * _dtype(base).itemsize >= LONG
 
 
-def _copier(one: Field) -> Copier | None:
+def _copier(one: MessageField) -> Copier | None:
     if one.length is None:
         if one.nested:
             return partial(_copy_nested, one.nested)
@@ -445,7 +445,7 @@ def _number_or_as_is(base: str, value: Any) -> Any:
         return value
 
 
-def _copy_nested(cls: type[Message], value: Any) -> Any:
+def _copy_nested(cls: type[RosMessage], value: Any) -> Any:
     if isinstance(value, cls):
         return type(value)._copied(value)
     copied = list(cls._values(value))
@@ -470,7 +470,7 @@ def _copy_list(copier: Copier, count: int, values: Any) -> list[Any]:
 def _copy_bytes(dtype: np.dtype[Any], count: int, values: Any) -> Any:
     """Copy a list of ``byte``: ``bytes`` of length 1 in rclpy, signed numbers in rospy."""
     if isinstance(values, list | tuple) and values:
-        values = b"".join(values) if isinstance(values[0], bytes) else bytes(one & 255 for one in values)
+        values = b"".join(values) if isinstance(values[0], bytes) else bytes(value & 255 for value in values)
     return _copy_array(dtype, count, values)
 
 
@@ -479,7 +479,7 @@ def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
     if kind is list or kind is tuple:
         if dtype.char != "?":  # an array refuses fractions as whole numbers
             values = array(dtype.char, values)
-    elif kind is Received:
+    elif kind is ReceivedNumbers:
         values = values.array
     elif kind is bytes or kind is bytearray:
         values = np.frombuffer(values, np.uint8)
@@ -497,7 +497,7 @@ def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
 _SECOND = 1_000_000_000
 
 
-class Stamp(Message):
+class Stamp(RosMessage):
     """Base of times and durations. Every object with ``sec`` and ``nanosec`` may be the other operand."""
 
     __slots__ = ()

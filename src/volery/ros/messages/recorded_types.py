@@ -16,7 +16,7 @@ from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from volery.base.errors import UsageError, choices
-from volery.ros.messages.containers import DAMAGE, Source
+from volery.ros.messages.containers import DAMAGE, RecordedTopic
 from volery.ros.messages.conversion import HEADER, Conversion
 from volery.ros.messages.encodings import (
     bounded,
@@ -59,7 +59,7 @@ class RecordedType:
         UsageError: messages of this type cannot be decoded; the text says why.
     """
 
-    def __init__(self, source: Source, stated: str = "") -> None:
+    def __init__(self, source: RecordedTopic, stated: str = "") -> None:
         self.name, self.encoding = source.type, source.encoding
         self._source = source
         self._hint = stated
@@ -132,7 +132,9 @@ class RecordedType:
     def _noetic_types(self) -> Typestore:
         known, noetic, types = self._known, _noetic(), get_typestore(Stores.EMPTY)
         parts = _closure(self.name, noetic.fielddefs, known)
-        types.register({one: (noetic if one in noetic.fielddefs else known).fielddefs[one] for one in parts})
+        types.register(
+            {part: (noetic if part in noetic.fielddefs else known).fielddefs[part] for part in parts}
+        )
         return types
 
     @property
@@ -303,4 +305,4 @@ def _learn(types: Typestore, name: str) -> None:
 
 def _of_ros2(name: str, what: Any) -> Any:
     constants, fields = what
-    return constants, [one for one in fields if (name, one[0]) != (HEADER, "seq")]
+    return constants, [field for field in fields if (name, field[0]) != (HEADER, "seq")]

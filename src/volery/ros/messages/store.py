@@ -23,10 +23,10 @@ from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.message import (
     DEFAULTS,
     DurationValue,
-    Field,
     Header,
-    Message,
+    MessageField,
     Nothing,
+    RosMessage,
     TimeValue,
     make_class,
 )
@@ -77,7 +77,7 @@ def _split(name: str, text: str, what: str, count: int) -> list[str]:
     return found
 
 
-_classes: dict[str, type[Message]] = {}
+_classes: dict[str, type[RosMessage]] = {}
 _services: dict[str, ServiceType] = {}
 
 
@@ -85,8 +85,8 @@ class ServiceType(NamedTuple):
     """A service type's name (``package/srv/Name``) and the classes of its request and response."""
 
     name: str
-    request: type[Message]
-    response: type[Message]
+    request: type[RosMessage]
+    response: type[RosMessage]
 
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
@@ -221,7 +221,7 @@ def define_ros1_action(package: str, name: str) -> bool:
     known = store().fielddefs
     full = f"{package}/msg/{name}"
     labels = (name.removesuffix(ending) for ending in _ROS1_ENDINGS if name.endswith(ending))
-    label = next((one for one in labels if f"{package}/action/{one}_FeedbackMessage" in known), None)
+    label = next((label for label in labels if f"{package}/action/{label}_FeedbackMessage" in known), None)
     if label is None or full in known:
         return label is not None
     inner = f"{package}/msg/{label}"
@@ -246,8 +246,8 @@ _LITERAL = re.compile(r"""\[[^]]*\]|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^\s#]+"
 def stated_defaults(text: str) -> Iterator[tuple[str, Any]]:
     """Yield the fields of a definition of ROS 2 that state a default, with its value."""
     for label, rest in _STATED.findall(text):
-        found = _LITERAL.match(rest)
-        literal = re.sub(r"\b(true|false)\b", lambda word: word[0].title(), found[0] if found else "")
+        match = _LITERAL.match(rest)
+        literal = re.sub(r"\b(true|false)\b", lambda word: word[0].title(), match[0] if match else "")
         with suppress(ValueError, SyntaxError):  # what is no value is a comment's or a string without quotes
             yield label, ast.literal_eval(literal)
 
@@ -454,7 +454,7 @@ def service_name(name: str) -> str:
     return full
 
 
-def message_class(name: str) -> type[Message]:
+def message_class(name: str) -> type[RosMessage]:
     """Return the class of a message type, created on demand; raise ``UsageError`` if the type is unknown."""
     known = _classes.get(name)
     if known:
@@ -466,7 +466,7 @@ def message_class(name: str) -> type[Message]:
             _describe(rosbags.normalize_fieldname(key), what) for key, what in fields if key != FILLER
         ]
         named = [(rosbags.normalize_fieldname(label), kind, value) for label, kind, value in constants]
-        made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
+        made = make_class(full, _BASES.get(full, RosMessage if described else Nothing), named, described)
         _classes[full] = made
         store().types[full] = made  # what bytes are decoded to
         if issubclass(made, (TimeValue, DurationValue)):
@@ -476,7 +476,7 @@ def message_class(name: str) -> type[Message]:
 
 
 _TIME, _DURATION = "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"
-_BASES: dict[str, type[Message]] = {
+_BASES: dict[str, type[RosMessage]] = {
     _TIME: TimeValue,
     _DURATION: DurationValue,
     "std_msgs/msg/Header": Header,
@@ -495,19 +495,19 @@ def _introduce(made: Any) -> None:
         message_class(_TIME)
 
 
-def _describe(name: str, what: Any) -> Field:
+def _describe(name: str, what: Any) -> MessageField:
     kind, detail = what
     if kind == rosbags.Nodetype.BASE:
-        return Field(name, detail[0], None, None)
+        return MessageField(name, detail[0], None, None)
     if kind == rosbags.Nodetype.NAME:
-        return Field(name, "", message_class(detail), None)
+        return MessageField(name, "", message_class(detail), None)
     (inner_kind, inner), count = detail
     bound = 0
     if kind == rosbags.Nodetype.SEQUENCE:
         count, bound = 0, count or 0
     if inner_kind == rosbags.Nodetype.BASE:
-        return Field(name, inner[0], None, count, bound)
-    return Field(name, "", message_class(inner), count, bound)
+        return MessageField(name, inner[0], None, count, bound)
+    return MessageField(name, "", message_class(inner), count, bound)
 
 
 def service(name: str) -> ServiceType:
@@ -540,7 +540,7 @@ def new(name: str, /, **fields: Any) -> Any:
         ) from None
 
 
-def _nested(cls: type[Message], key: str, value: dict[str, Any]) -> Any:
+def _nested(cls: type[RosMessage], key: str, value: dict[str, Any]) -> Any:
     for label, what in store().fielddefs[cls.__msgtype__][1]:
         if rosbags.normalize_fieldname(label) == key and what[0] == rosbags.Nodetype.NAME:
             return new(str(what[1]), **value)

@@ -125,8 +125,12 @@ class Workspace:
             return {}
         if package.folder not in self._beside:
             found = {package.name: package}
-            siblings = (one for one in _subfolders(package.folder.parent) if (one / MANIFEST).is_file())
-            sources = [one for one in package.folder.parents[:LEVELS] if one.name == "src"]
+            siblings = (
+                subfolder
+                for subfolder in _subfolders(package.folder.parent)
+                if (subfolder / MANIFEST).is_file()
+            )
+            sources = [parent for parent in package.folder.parents[:LEVELS] if parent.name == "src"]
             for one in _packages((*siblings, *sources[-1:])):
                 found.setdefault(one.name, one)
             self._beside[package.folder] = found

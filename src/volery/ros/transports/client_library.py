@@ -17,7 +17,7 @@ from volery.base.time import Ns, S, to_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 from volery.ros.graph.interface import QoS, ServiceState, TopicState
-from volery.ros.messages import Message, ServiceType
+from volery.ros.messages import RosMessage, ServiceType
 
 
 class ReceivedMessage(NamedTuple):
@@ -34,10 +34,10 @@ class ReceivedMessage(NamedTuple):
 
 OnMessage = Callable[[ReceivedMessage], None]
 
-OnResponse = Callable[[Message | None, str], None]
+OnResponse = Callable[[RosMessage | None, str], None]
 """Receives the response, or None and the reason why there is none."""
 
-OnRequest = Callable[[Message, OnResponse], None]
+OnRequest = Callable[[RosMessage, OnResponse], None]
 """Receives a request, and what to call with the response, once, from any thread."""
 
 
@@ -74,7 +74,7 @@ class LibraryService(Protocol):
 class LibraryClient(Protocol):
     """A client of one service."""
 
-    def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
+    def call(self, request: RosMessage, done: OnResponse) -> Callable[[], None]:
         """Send a request, and call `done` with the response; return what abandons the call."""
 
     def ready(self) -> bool:
@@ -211,13 +211,13 @@ def pending_calls(kernel: Kernel) -> tuple[str, ...]:
 
 def poll_in_thread(kernel: Kernel, what: str, holds: Callable[[], bool], within: Ns | None) -> bool:
     """Block the current task until `holds`, which a thread polls; return False if `within` ns pass first."""
-    seen = Signal(kernel, what)
+    signal = Signal(kernel, what)
     found: list[bool] = []
     given_up = threading.Event()
 
     def announce() -> None:
         found.append(True)
-        seen.notify()
+        signal.notify()
 
     def poll() -> None:
         while not given_up.is_set():
@@ -228,7 +228,7 @@ def poll_in_thread(kernel: Kernel, what: str, holds: Callable[[], bool], within:
 
     threading.Thread(target=poll, name=what, daemon=True).start()
     try:
-        return seen.wait_for(lambda: found, within)
+        return signal.wait_for(lambda: found, within)
     finally:
         given_up.set()
 

@@ -32,7 +32,7 @@ from volery.ros.graph.interface import (
     free,
     no_route,
 )
-from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED, Surroundings, unserved
+from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED, KnownParticipants, unserved
 from volery.ros.messages import new, to_cdr
 from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage, run_in_thread
 from volery.ros.transports.transport_node import TransportNode
@@ -141,15 +141,15 @@ class TransportGraph:
         for node in list(self._nodes.values()):  # of other threads, too
             node.notice()
         wants, now = self._graph.wants, self.kernel.now()
-        if all(one.met for one in list(wants.entries.values()) if one.node in self._nodes):
+        if all(entry.met for entry in list(wants.entries.values()) if entry.node in self._nodes):
             return
         for topic in self.topics():
             for kind, nodes in ((PUBLISHED, topic.publishers), (SUBSCRIBED, topic.subscribers)):
                 for node_name in nodes:
                     wants.of(kind, topic.name, topic.type, ("", node_name), now)
-        wants.served.update((one.name, one.type) for one in self.services())
+        wants.served.update((service.name, service.type) for service in self.services())
 
-    def unserved(self, around: Surroundings) -> list[Unserved]:
+    def unserved(self, around: KnownParticipants) -> list[Unserved]:
         """Return what components of this process have offered or asked for and no node took or served."""
         return unserved(self._graph.wants, around, self.kernel.now())
 

@@ -25,15 +25,15 @@ from volery.ros.graph.interface import (
     AS_OFFERED,
     DEFAULT,
     Callback,
-    Group,
     Handler,
     Node,
     QoS,
+    ReadyCallbacks,
     full_node_name,
 )
 from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
-from volery.ros.messages import Message, ServiceType, message_class, service
+from volery.ros.messages import RosMessage, ServiceType, message_class, service
 from volery.ros.messages.encodings import copied_to_cdr
 from volery.ros.transports.client_library import (
     LibraryClient,
@@ -225,18 +225,18 @@ class TransportService:
         self._pending: list[OnResponse] = []
         self._open = True
 
-    def request(self, request: Message, respond: OnResponse) -> None:
+    def request(self, request: RosMessage, respond: OnResponse) -> None:
         """Queue a request that has arrived. Called by a thread of the client library."""
         self.node.kernel.post(partial(self._queue, request, respond))
 
-    def _queue(self, request: Message, respond: OnResponse) -> None:
+    def _queue(self, request: RosMessage, respond: OnResponse) -> None:
         if not self._open:
             respond(None, "its server has gone")
             return
         self._pending.append(respond)
         self._group.add(Work(self.node.kernel.now(), partial(self._answer, request, respond)))
 
-    def _answer(self, request: Message, respond: OnResponse) -> None:
+    def _answer(self, request: RosMessage, respond: OnResponse) -> None:
         if respond not in self._pending:
             return
         try:
@@ -253,7 +253,7 @@ class TransportService:
             return
         self._end(respond, content, "")
 
-    def _end(self, respond: OnResponse, answer: Message | None, problem: str) -> None:
+    def _end(self, respond: OnResponse, answer: RosMessage | None, problem: str) -> None:
         with self.node.kernel.guard:
             if respond in self._pending:
                 self._pending.remove(respond)
@@ -282,10 +282,10 @@ class TransportClient:
         self._node.check_open()
         if not isinstance(request, self._kind.request):
             raise UsageError(f"service {self.name} takes a {self._kind.request.__msgtype__}, not {request!r}")
-        outcome: list[tuple[Message | None, str]] = []
+        outcome: list[tuple[RosMessage | None, str]] = []
         answered = Signal(self._node.kernel, f"service {self.name} (answer)")
 
-        def arrive(answer: Message | None, problem: str) -> None:
+        def arrive(answer: RosMessage | None, problem: str) -> None:
             outcome.append((answer, problem))
             answered.notify()
 
@@ -408,17 +408,17 @@ class TransportNode(LocalNode):
         message_type: str,
         callback: Callback,
         qos: QoS = AS_OFFERED,
-        group: Group | None = None,
+        group: ReadyCallbacks | None = None,
     ) -> TransportSubscription:
         """Call `callback` with each message of a topic."""
         full, kind = self.resolve(topic), message_class(message_type).__msgtype__
-        made = TransportSubscription(self._node, full, kind, callback, self._group_of(group))
-        subscribe = partial(self.library.subscribe, full, kind, qos, made.arrive)
-        made.connect(self._call(f"subscribe {full}", subscribe), qos)
-        return self._keep(made)
+        subscription = TransportSubscription(self._node, full, kind, callback, self._group_of(group))
+        subscribe = partial(self.library.subscribe, full, kind, qos, subscription.arrive)
+        subscription.connect(self._call(f"subscribe {full}", subscribe), qos)
+        return self._keep(subscription)
 
     def serve(
-        self, name: str, service_type: str, handler: Handler, group: Group | None = None
+        self, name: str, service_type: str, handler: Handler, group: ReadyCallbacks | None = None
     ) -> TransportService:
         """Answer requests."""
         full, kind = self.resolve(name), service(service_type)

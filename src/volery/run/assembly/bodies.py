@@ -13,16 +13,16 @@ from volery.base.elementary import exp, log
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import to_seconds
 from volery.model.airframes import FRAMES, Airframe, Propellers
-from volery.model.airframes import Battery as BatteryModel
-from volery.model.environment import Vehicle
+from volery.model.airframes import BatterySpec as BatteryModel
+from volery.model.environment import VehicleSpec
 from volery.run.assembly.mounted_sensors import sensors_of
 from volery.simulation.world.body_specs import (
     AIR_DENSITY,
     STANDARD_GRAVITY,
-    Battery,
+    BatteryPack,
     BodySpec,
     Multirotor,
-    Rover,
+    WheeledRover,
     frame_rotors,
 )
 
@@ -41,7 +41,7 @@ _DRAG_AREA = 0.03
 """Drag area of a body of 1 kg [m^2]."""
 
 
-def body_of(vehicle: Vehicle) -> BodySpec:
+def body_of(vehicle: VehicleSpec) -> BodySpec:
     """Return the body of a vehicle at its place in the model.
 
     Raises:
@@ -49,7 +49,7 @@ def body_of(vehicle: Vehicle) -> BodySpec:
     """
     body: BodySpec
     if vehicle.kind != "multirotor":
-        usual = Rover()
+        usual = WheeledRover()
         mass = usual.mass + vehicle.payload_kg
         body = replace(usual, mass=mass, battery=_battery(vehicle.battery, usual.battery))
     elif vehicle.airframe is not None:
@@ -73,14 +73,14 @@ def body_of(vehicle: Vehicle) -> BodySpec:
         raise ModelError(str(error), at, vehicle.where) from None
 
 
-def _battery(model: BatteryModel | None, usual: Battery) -> Battery:
+def _battery(model: BatteryModel | None, usual: BatteryPack) -> BatteryPack:
     if model is None:
         return usual
     resistance = usual.resistance_ohm if model.resistance_ohm is None else model.resistance_ohm
-    return Battery(model.capacity_coulomb / 3600.0, _cells(model, usual), resistance, model.charge)
+    return BatteryPack(model.capacity_coulomb / 3600.0, _cells(model, usual), resistance, model.charge)
 
 
-def _cells(model: BatteryModel, usual: Battery) -> int:
+def _cells(model: BatteryModel, usual: BatteryPack) -> int:
     return usual.cells if model.voltage_v is None else max(1, round(model.voltage_v / CELL_NOMINAL_VOLTS))
 
 
@@ -94,7 +94,7 @@ def _own_multirotor(airframe: Airframe, model: BatteryModel) -> Multirotor:
     area = airframe.drag_area_m2
     if area is None:
         area = _DRAG_AREA * exp(log(mass) * 2.0 / 3.0)
-    cells, ampere_hours = _cells(model, Battery()), model.capacity_coulomb / 3600.0
+    cells, ampere_hours = _cells(model, BatteryPack()), model.capacity_coulomb / 3600.0
     resistance = model.resistance_ohm or CELL_RESISTANCE * cells / ampere_hours
     roll = _ROLL_INERTIA * mass * arm * arm
     return Multirotor(
@@ -113,7 +113,7 @@ def _own_multirotor(airframe: Airframe, model: BatteryModel) -> Multirotor:
         spin_damping=_SPIN_DAMPING * roll,
         feet=(_FOOT * arm, _FOOT * arm, _DEPTH * arm),
         idle_power=airframe.idle_power_w,
-        battery=Battery(ampere_hours, cells, resistance, model.charge),
+        battery=BatteryPack(ampere_hours, cells, resistance, model.charge),
     )
 
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 from volery.base.errors import ModelError, UsageError
 from volery.base.position import Position
 from volery.components.entry_points import find_executable
-from volery.components.instance import Instance
+from volery.components.instance import RunningInstance
 from volery.components.loader import Loader
 from volery.components.polling import Polling
-from volery.components.ports import ObservedVehicle, Port, PortList
+from volery.components.ports import ComponentPort, PortList, TrueVehicle
 from volery.components.programs import (
     ClassProgram,
-    Program,
+    InstanceProgram,
     ScriptProgram,
     StubProgram,
     load_program,
@@ -30,8 +30,8 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.model.components import CPP_LANGUAGES, VEHICLE_INTERFACES, Component, Signature
-from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
+from volery.model.instances import PortConnection, TargetKind
 from volery.model.system import System
 from volery.model.system_loader import check_code
 from volery.ros.client_libraries.importable_modules import importable_modules
@@ -39,10 +39,10 @@ from volery.ros.client_libraries.library_base import Launch, node_label
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_short
 from volery.ros.graph.graph_context import Records
-from volery.ros.graph.unserved import Surroundings
+from volery.ros.graph.unserved import KnownParticipants
 from volery.ros.messages import Library, Workspace, define_imported
 from volery.run.assembly.component_ends import ComponentEnds
-from volery.run.assembly.computers import Platform, commanded_by, is_node
+from volery.run.assembly.computers import ComputingPlatform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
 from volery.run.assembly.recorded_input import recorded_input
@@ -104,22 +104,22 @@ class LateBoundProgram:
     """
 
     def __init__(
-        self, program: Program, names: Iterable[str], connect: Callable[[], Mapping[str, Any]]
+        self, program: InstanceProgram, names: Iterable[str], connect: Callable[[], Mapping[str, Any]]
     ) -> None:
         self._program = program
         self._names = tuple(names)
         self._connect = connect
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         self._program.check([*given, *self._names], operations, active)
 
     def make(self, given: Mapping[str, Any]) -> object:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         return self._program.make({**given, **self._connect()})
 
     def run(self, thing: object) -> None:
-        """See ``Program``."""
+        """See ``InstanceProgram``."""
         self._program.run(thing)
 
 
@@ -132,7 +132,7 @@ class BuiltComponents:
 
     starters: tuple[Callable[[], object], ...]
     loader: Loader
-    instances: Mapping[str, Instance]
+    instances: Mapping[str, RunningInstance]
     doubts: tuple[str, ...] = ()
     unserved: Callable[[], list[Unserved]] = list
     finish: Callable[[], None] = lambda: None
@@ -199,7 +199,7 @@ class ProcessPart:
 
     graph: RosGraph
     instances: tuple[InstanceModel, ...]
-    reach: Callable[[InstanceModel, InstanceModel], Port]
+    reach: Callable[[InstanceModel, InstanceModel], ComponentPort]
     nodes: Mapping[str, Node] = field(default_factory=dict)
     truth: Callable[[str], Truth] | None = None
 
@@ -214,7 +214,7 @@ class Builder:
         self,
         system: System,
         kernel: Kernel,
-        platform: Platform,
+        platform: ComputingPlatform,
         fleet: SimulatedFleet | None,
         ending: Ending,
         *,
@@ -235,7 +235,7 @@ class Builder:
         )
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._landable: dict[str, Landable] = {}
-        self._instances: dict[str, Instance] = {}
+        self._instances: dict[str, RunningInstance] = {}
         self._ends = ComponentEnds(kernel, self._graph, ending, self._commanded_alone)
         self._served: dict[str, str] = {}  # the kind of names of each vehicle that has a node
 
@@ -276,8 +276,8 @@ class Builder:
         if not isinstance(self._graph, EmbeddedGraph):
             return []
         served = {name: node for name, node in self._served.items() if node}
-        without = [one.name for one in self._system.vehicles if one.name not in served]
-        return self._graph.unserved(Surroundings(self._instances, served, without))
+        without = [vehicle.name for vehicle in self._system.vehicles if vehicle.name not in served]
+        return self._graph.unserved(KnownParticipants(self._instances, served, without))
 
     def _launches(self) -> dict[str, Launch]:
         """Return the launch settings of the nodes of this process.
@@ -285,7 +285,9 @@ class Builder:
         A node that nothing names has its file's name. It has the instance's where several instances run one
         file in one namespace, and where it exists before the file runs, to command vehicles.
         """
-        launches = {one.name: self._launch(one) for one in self._system.instances if is_node(one)}
+        launches = {
+            instance.name: self._launch(instance) for instance in self._system.instances if is_node(instance)
+        }
         alike = Counter((launch.arguments[0], launch.namespace) for launch in launches.values())
         found = {}
         for model in self._models:
@@ -303,8 +305,8 @@ class Builder:
             ros=2 if "rcl" in model.component.language else 1,
         )
 
-    def _instance(self, model: InstanceModel, steps: StepCounter | None) -> Instance:
-        return Instance(
+    def _instance(self, model: InstanceModel, steps: StepCounter | None) -> RunningInstance:
+        return RunningInstance(
             self._kernel,
             model.name,
             self._platform.allocation(model),
@@ -326,20 +328,24 @@ class Builder:
         if not isinstance(program, ScriptProgram):  # a script reads its parameters from ROS
             given = {**model.parameters, **given}
         if commanded_by(model):
-            commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
-            names = [one.port for one in commands]
+            commands = [
+                connection
+                for connection in model.connections.values()
+                if _kind(connection) is TargetKind.VEHICLE
+            ]
+            names = [command.port for command in commands]
             program = LateBoundProgram(program, names, lambda: self._connect(model, commands))
         return self._ends.starter(instance, model.component.on_failure, program, given)
 
     def _commanded_alone(self, component: str) -> list[Landable]:
         """Return the vehicles that a component commands, by its ports or by topics, and no other one does."""
-        others = [one for one in self._models if one.name != component and self._ends.runs(one.name)]
-        by_ports = {name for one in others for name in commanded_by(one)}
+        others = [model for model in self._models if model.name != component and self._ends.runs(model.name)]
+        by_ports = {name for other in others for name in commanded_by(other)}
         found = []
         for name, vehicle in self._landable.items():
             commanders = self._publishers_to(name)
             flown = component in commanders or name in commanded_by(self._system.instance(component))
-            if flown and name not in by_ports and not commanders & {one.name for one in others}:
+            if flown and name not in by_ports and not commanders & {other.name for other in others}:
                 if isinstance(vehicle, UnattendedVehicle):
                     vehicle.abandoned = True
                 found.append(vehicle)
@@ -363,7 +369,7 @@ class Builder:
             if any(node.name in nodes for node in self._graph.nodes_of(model.name))
         }
 
-    def _program(self, model: InstanceModel, loader: Loader) -> Program:
+    def _program(self, model: InstanceModel, loader: Loader) -> InstanceProgram:
         component = model.component
         if not component.path or (is_cpp(component) and model.name not in self._cpp):
             period = model.activity.period_ns if model.activity else None
@@ -389,16 +395,16 @@ class Builder:
                 found[connection.port] = bodies if connection.many else bodies[0]
         return found
 
-    def _body(self, vehicle: str) -> ObservedVehicle:
+    def _body(self, vehicle: str) -> TrueVehicle:
         assert self._fleet is not None, "components of the environment are in the process of the vehicles"
-        return ObservedVehicle(self._kernel, vehicle, self._fleet.truth(vehicle))
+        return TrueVehicle(self._kernel, vehicle, self._fleet.truth(vehicle))
 
-    def _port(self, model: InstanceModel, callee: str) -> Port:
+    def _port(self, model: InstanceModel, callee: str) -> ComponentPort:
         other = self._system.instance(callee)
         if self._part is not None and callee not in self._instances:
             return self._part.reach(model, other)
         here, there = model.processor, other.processor
-        return Port(
+        return ComponentPort(
             self._kernel,
             model.name,
             self._instances[callee],
@@ -406,7 +412,7 @@ class Builder:
             self._platform.travel(there, here),
         )
 
-    def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
+    def _connect(self, model: InstanceModel, commands: Iterable[PortConnection]) -> dict[str, Any]:
         """Join the graph and return the vehicles that the instance commands, by port."""
         node = self._join(model)
         found: dict[str, Any] = {}
@@ -433,7 +439,7 @@ class Builder:
         return vehicle
 
     def _open(self, node: Node, name: str, interface: str) -> Drone | Rover:
-        vehicle = next(one for one in self._system.vehicles if one.name == name)
+        vehicle = next(vehicle for vehicle in self._system.vehicles if vehicle.name == name)
         served = graph_access(vehicle.autopilot, name)
         home = drivers.load(vehicle.autopilot).home_options(vehicle.at.position)
         driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace, **home})
@@ -506,7 +512,7 @@ class Builder:
         sensors.serve()
 
     def _sensor_node(self, fleet: SimulatedFleet, name: str, context: ExecutionContext) -> SensorNode:
-        vehicle = next(one for one in self._system.vehicles if one.name == name)
+        vehicle = next(vehicle for vehicle in self._system.vehicles if vehicle.name == name)
         prefix = frames_of(self._system.vehicles).get(name, "")
         return SensorNode(self._graph, fleet.flights[name], vehicle, context, fleet.alterations[name], prefix)
 
@@ -519,7 +525,7 @@ def with_executables(system: System) -> System:
     """
     workspace = Workspace(system.folder)
     found: dict[str, Component] = {}
-    for component in (one.component for one in system.instances):
+    for component in (instance.component for instance in system.instances):
         if not (component.package or component.executable) or component.path:
             continue
         if not (component.package and component.executable):
@@ -539,12 +545,13 @@ def with_executables(system: System) -> System:
     if not found:
         return system
     instances = (
-        replace(one, component=found.get(one.component.name, one.component)) for one in system.instances
+        replace(instance, component=found.get(instance.component.name, instance.component))
+        for instance in system.instances
     )
     return replace(system, instances=tuple(instances))
 
 
-def python_program(system: System, model: InstanceModel, loader: Loader) -> Program:
+def python_program(system: System, model: InstanceModel, loader: Loader) -> InstanceProgram:
     """Load the Python file of an instance, and check its operations against the interfaces.
 
     Raises:
@@ -571,7 +578,7 @@ def python_program(system: System, model: InstanceModel, loader: Loader) -> Prog
     )
     if isinstance(program, ClassProgram):
         for signature in provided_operations(system, model).values():
-            program.check_signature(signature.name, [one.name for one in signature.arguments])
+            program.check_signature(signature.name, [argument.name for argument in signature.arguments])
     return program
 
 
@@ -584,6 +591,6 @@ def provided_operations(system: System, model: InstanceModel) -> dict[str, Signa
     }
 
 
-def _kind(connection: Connection) -> TargetKind | None:
+def _kind(connection: PortConnection) -> TargetKind | None:
     """Return the kind of a connection's targets, which is the same for all of them."""
     return connection.targets[0].kind if connection.targets else None

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import partial
 
-from volery.components.instance import Instance
-from volery.components.loader import Host
-from volery.components.programs import Program, start
+from volery.components.instance import RunningInstance
+from volery.components.loader import ScriptHost
+from volery.components.programs import InstanceProgram, start
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.model.components import END_RUN, RESTART, OnFailure
@@ -24,7 +24,7 @@ CommandedAlone = Callable[[str], Iterable[Landable]]
 """Returns the vehicles that a component, and no other that still runs, commands."""
 
 
-class ComponentEnds(Host):
+class ComponentEnds(ScriptHost):
     """Starts the components of one run and acts when they end.
 
     Args:
@@ -41,12 +41,12 @@ class ComponentEnds(Host):
         self._graph = graph
         self._ending = ending
         self._commanded_alone = commanded_alone
-        self._instances: dict[str, Instance] = {}
+        self._instances: dict[str, RunningInstance] = {}
         self._restarts: dict[str, int] = {}
         self._flown: dict[str, list[Landable]] = {}  # by a script that has ended, whose nodes are gone
 
     def starter(
-        self, instance: Instance, policy: OnFailure, program: Program, given: dict[str, object]
+        self, instance: RunningInstance, policy: OnFailure, program: InstanceProgram, given: dict[str, object]
     ) -> Starter:
         """Return a function that starts the component."""
         self._instances[instance.name] = instance
@@ -67,11 +67,11 @@ class ComponentEnds(Host):
     # -- see ``Host``
 
     def at_end(self, context: ExecutionContext, last: Callable[[], object]) -> None:
-        """See ``Host``."""
+        """See ``ScriptHost``."""
         self._ending.farewell(context, last)
 
     def leave(self, component: str) -> None:
-        """See ``Host``."""
+        """See ``ScriptHost``."""
         self._ending.say_farewell(component)
         kernel = self._kernel
         with kernel.interact():  # spends the execution time of the last activation
@@ -80,7 +80,7 @@ class ComponentEnds(Host):
             kernel.call_at(kernel.now(), partial(self._remove, component, "it has ended"))
 
     def kill(self, component: str) -> None:
-        """See ``Host``."""
+        """See ``ScriptHost``."""
         self._ending.forget_farewells(component)
         self._close_nodes(component)
         self._kernel.call_at(self._kernel.now(), partial(self._remove, component, "it has ended"))

@@ -28,10 +28,10 @@ from volery.kernel.network import Network
 from volery.kernel.processor import QUANTUM, Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.components import CPP_LANGUAGES, ROS_LANGUAGES, Figure
+from volery.model.components import CPP_LANGUAGES, ROS_LANGUAGES, StatedFigure
 from volery.model.instances import Instance, TargetKind
-from volery.model.system import Network as NetworkModel
-from volery.model.system import Processor as ProcessorModel
+from volery.model.system import NetworkSpec as NetworkModel
+from volery.model.system import ProcessorSpec as ProcessorModel
 from volery.model.system import System
 from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.cpp import core_of
@@ -120,11 +120,14 @@ VEHICLE_NODE_LANGUAGE = "roscpp"
 """The node that serves a vehicle represents MAVROS, which uses roscpp."""
 
 
-def _stated_costs(figures: Iterable[Figure]) -> tuple[StatedCost, ...]:
-    return tuple(StatedCost(one.processor, one.frequency_hz, one.time_ns, one.energy_j) for one in figures)
+def _stated_costs(figures: Iterable[StatedFigure]) -> tuple[StatedCost, ...]:
+    return tuple(
+        StatedCost(figure.processor, figure.frequency_hz, figure.time_ns, figure.energy_j)
+        for figure in figures
+    )
 
 
-class Platform:
+class ComputingPlatform:
     """Processors and networks of one run, and the prices of computing on them."""
 
     def __init__(self, system: System, kernel: VirtualKernel, seed: int, fidelity: str) -> None:
@@ -280,7 +283,7 @@ FEED_PERIOD: Ns = 500 * MS
 class PowerFeed:
     """Draws the power of the computers from the batteries of their vehicles."""
 
-    def __init__(self, kernel: Kernel, platform: Platform, fleet: SimulatedFleet) -> None:
+    def __init__(self, kernel: Kernel, platform: ComputingPlatform, fleet: SimulatedFleet) -> None:
         self._kernel = kernel
         self._platform = platform
         self._fleet = fleet

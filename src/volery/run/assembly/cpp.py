@@ -21,10 +21,10 @@ import numpy as np
 from volery.base.errors import ModelError
 from volery.components.cpp.build import (
     DRONE,
-    ClientLibrary,
     CompiledComponent,
     CppComponent,
-    RequiredPort,
+    CppPort,
+    LibraryHeaders,
     compile_component,
     compile_each,
     operations,
@@ -53,7 +53,7 @@ from volery.ros.graph import Node, RosGraph
 from volery.run.assembly.vehicle_nodes import use_message_versions
 
 if TYPE_CHECKING:
-    from volery.cost.native import Program
+    from volery.cost.native import OptimisedCode
 
 
 _FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros|6rclcpp|13rclcpp_action|16rclcpp_lifecycle|7tf2_ros)')
@@ -161,7 +161,7 @@ class TracingCompiler:
 
     def __init__(self, law: CoreLaw) -> None:
         self.law = law
-        self.program: Program | None = None
+        self.program: OptimisedCode | None = None
 
     def __call__(
         self, tools: CppToolchain, sources: Sequence[Path], include: Sequence[Path], flags: Sequence[str]
@@ -187,9 +187,9 @@ class TracingCompiler:
 
 
 _LIBRARIES = {
-    "c++": ClientLibrary(),
-    "roscpp": ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers, NOT_OFFERED),
-    "rclcpp": ClientLibrary(
+    "c++": LibraryHeaders(),
+    "roscpp": LibraryHeaders((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers, NOT_OFFERED),
+    "rclcpp": LibraryHeaders(
         (rclcpp.INCLUDE,), rclcpp.FALLBACK, rclcpp.generate_headers, NOT_OFFERED, rclcpp.main_of
     ),
 }
@@ -242,12 +242,12 @@ def compile_all(
         return {}
     use_message_versions(system.vehicles)
     return {
-        one.name: _compile(
-            system, one, None if traced else tell, TracingCompiler(core) if traced and core else core
+        instance.name: _compile(
+            system, instance, None if traced else tell, TracingCompiler(core) if traced and core else core
         )
-        for one in instances
-        if is_cpp(one.component)
-        for core in (core_of(system, fidelity, one),)
+        for instance in instances
+        if is_cpp(instance.component)
+        for core in (core_of(system, fidelity, instance),)
     }
 
 
@@ -282,7 +282,7 @@ def describe_component(system: System, component: Component) -> CppComponent:
             for interface in component.provides.values()
             for operation in operations(system.interfaces[interface])
         ),
-        tuple(RequiredPort(port.name, port.interface, port.many) for port in component.requires.values()),
+        tuple(CppPort(port.name, port.interface, port.many) for port in component.requires.values()),
         system.interfaces,
         tuple(_from_model(system, flag) for flag in component.build.flags),
         component.build.libraries,
@@ -337,7 +337,11 @@ class CppPrograms:
     def warnings(self, instances: Iterable[InstanceModel]) -> list[str]:
         """Return doubts about the counted costs, and which of *instances* could not be compiled."""
         said = {one.counting.estimated: None for one in self._ready.values() if one.counting is not None}
-        missing = [one.name for one in instances if is_cpp(one.component) and one.name not in self]
+        missing = [
+            instance.name
+            for instance in instances
+            if is_cpp(instance.component) and instance.name not in self
+        ]
         if missing:
             said[
                 f"{', '.join(missing)}: stated times alone, for there is no C++ compiler: {COMPILER_HINT}"

@@ -22,7 +22,7 @@ from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.links.wire_faults import WireFaults
-from volery.model.environment import Environment, Wind
+from volery.model.environment import Environment, WindSpec
 from volery.model.faults import (
     AddedSensorFault,
     BarometerStuck,
@@ -113,7 +113,7 @@ class Affected:
     kernel: Kernel
     fleet: SimulatedFleet
     links: LinkControl
-    wind: Wind = field(default_factory=Wind)
+    wind: WindSpec = field(default_factory=WindSpec)
     processors: Mapping[str, Processor] = field(default_factory=dict)
     networks: Mapping[str, Network] = field(default_factory=dict)
     loads: dict[str, list[Handle]] = field(default_factory=dict)
@@ -312,7 +312,7 @@ def _slow_computer(fault: ComputerSlowed, affected: Affected, active: bool) -> N
 
 
 def _change_wind(fault: WindChange, affected: Affected, active: bool) -> None:
-    wind = Wind(fault.speed_m_s, fault.direction_deg, fault.gusts_m_s) if active else affected.wind
+    wind = WindSpec(fault.speed_m_s, fault.direction_deg, fault.gusts_m_s) if active else affected.wind
     if affected.fleet.flights:  # a model of computers alone has no world
         affected.fleet.world.set_wind(wind_of(wind))
 

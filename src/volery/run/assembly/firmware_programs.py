@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from volery.base.errors import UsageError, choices
-from volery.model.environment import Firmware, Vehicle
+from volery.model.environment import FirmwareProgram, VehicleSpec
 from volery.run.assembly.moved_bodies import check_body
 from volery.run.result import Tell
 from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, firmwares
@@ -27,13 +27,13 @@ FOLDER, BODIES = "firmware", "bodies"
 """Folders of firmware and of FMUs in a run folder; each program has one in it, named after its vehicle."""
 
 
-def usual_firmware(autopilot: str, kind: str) -> Firmware | None:
+def usual_firmware(autopilot: str, kind: str) -> FirmwareProgram | None:
     """Return the usual program of a project for a kind of vehicle; None if there is none."""
     program = PROGRAMS[autopilot].programs.get(kind) if autopilot in PROJECTS else None
-    return Firmware(program) if program else None
+    return FirmwareProgram(program) if program else None
 
 
-def on_real_firmware(vehicles: Iterable[Vehicle]) -> tuple[Vehicle, ...]:
+def on_real_firmware(vehicles: Iterable[VehicleSpec]) -> tuple[VehicleSpec, ...]:
     """Return the vehicles, each on a real program if its project has one for its kind.
 
     A program has a version and features of its own, so those that are stated are left out.
@@ -76,7 +76,7 @@ class ProgramFolder:
             self._temporary = TemporaryDirectory(prefix="volery-programs-", ignore_cleanup_errors=True)
         return Path(self._temporary.name)
 
-    def prepare(self, vehicle: Vehicle) -> None:
+    def prepare(self, vehicle: VehicleSpec) -> None:
         """Say that a program boots, and remove what one of an earlier run has left, which it would remember.
 
         Raises:
@@ -99,7 +99,7 @@ class ProgramFolder:
             self._temporary = None
 
 
-def family_of(vehicle: Vehicle, programs: ProgramFolder, seed: int = 0) -> AutopilotFamily:
+def family_of(vehicle: VehicleSpec, programs: ProgramFolder, seed: int = 0) -> AutopilotFamily:
     """Return the family of the autopilot of a vehicle: a program of real firmware, or a simulated one.
 
     Args:
@@ -129,7 +129,7 @@ def family_of(vehicle: Vehicle, programs: ProgramFolder, seed: int = 0) -> Autop
     )
 
 
-def parameters_of(vehicle: Vehicle) -> Mapping[str, float]:
+def parameters_of(vehicle: VehicleSpec) -> Mapping[str, float]:
     """Return the parameters of a vehicle: those of its files, below its own.
 
     Raises:
@@ -141,7 +141,7 @@ def parameters_of(vehicle: Vehicle) -> Mapping[str, float]:
     return parameters | dict(vehicle.parameters)
 
 
-def check_autopilot(vehicle: Vehicle) -> None:
+def check_autopilot(vehicle: VehicleSpec) -> None:
     """Check that the autopilot of a vehicle is there, and so are the files of a program.
 
     Raises:
@@ -151,7 +151,7 @@ def check_autopilot(vehicle: Vehicle) -> None:
     parameters_of(vehicle)
 
 
-def check_programs(vehicles: Iterable[Vehicle]) -> None:
+def check_programs(vehicles: Iterable[VehicleSpec]) -> None:
     """Check that all programs of real firmware, their files and FMUs are there, before any starts.
 
     Raises:

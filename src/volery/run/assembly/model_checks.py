@@ -120,7 +120,7 @@ def _check_instance(system: System, instance: Instance, loader: Loader) -> None:
     if instance.component.language in PYTHON_ROS:
         define_imported(system.file_of(instance.component), loader.workspace)
     program = python_program(system, instance, loader)
-    given = {one.port for one in instance.connections.values() if one.targets}
+    given = {connection.port for connection in instance.connections.values() if connection.targets}
     if not isinstance(program, ScriptProgram):  # a script reads its parameters from ROS
         given |= set(instance.parameters)
     operations = provided_operations(system, instance)

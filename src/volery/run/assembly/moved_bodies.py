@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.run.assembly.bodies import body_of
 from volery.simulation.fmu.fmu_body import FmuBody
 from volery.simulation.fmu.fmu_interface import INPUTS, read_interface
@@ -12,7 +12,7 @@ from volery.simulation.fmu.running_fmu import RunningFmu
 from volery.simulation.world.body_specs import Multirotor
 
 
-def check_body(vehicle: Vehicle) -> None:
+def check_body(vehicle: VehicleSpec) -> None:
     """Check that the FMU of a vehicle, if it has one, can move it on this machine.
 
     Raises:
@@ -24,7 +24,7 @@ def check_body(vehicle: Vehicle) -> None:
         read_interface(vehicle.body, len(body.rotors))
 
 
-def start_body(vehicle: Vehicle, folder: Path) -> FmuBody:
+def start_body(vehicle: VehicleSpec, folder: Path) -> FmuBody:
     """Start the FMU that a vehicle has, in a folder below *folder*.
 
     Raises:

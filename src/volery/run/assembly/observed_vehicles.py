@@ -35,7 +35,11 @@ class ObservedVehicles:
 
     def progress(self) -> tuple[VehicleProgress, ...]:
         """Return the present state of each vehicle whose telemetry arrives."""
-        known = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.last_message_ns >= 0]
+        known = [
+            (vehicle.name, vehicle.telemetry)
+            for vehicle in self._vehicles
+            if vehicle.telemetry.last_message_ns >= 0
+        ]
         return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in known)
 
     def record_states(self) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Kernel
-from volery.model.environment import Load, Place
+from volery.model.environment import CarriedLoad, PlaceSpec
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.world import Truth
 from volery.trace.events import NOTICE, WARNING, BatteryService, Failure, Text
@@ -32,14 +32,14 @@ RELEASED, GRABBED = 0, 1
 """States of a gripper."""
 
 
-def serve_batteries(kernel: Kernel, fleet: SimulatedFleet, places: Iterable[Place]) -> None:
+def serve_batteries(kernel: Kernel, fleet: SimulatedFleet, places: Iterable[PlaceSpec]) -> None:
     """Swap and charge batteries at *places*, from now on: those of vehicles that stand there disarmed."""
     serving = [one for one in places if one.battery_swap_ns is not None or one.charging_w > 0.0]
     if serving:
         kernel.every(SERVICE_PERIOD, partial(_serve, kernel, fleet, serving, {}))
 
 
-def _serve(kernel: Kernel, fleet: SimulatedFleet, places: Sequence[Place], since: dict[str, Ns]) -> None:
+def _serve(kernel: Kernel, fleet: SimulatedFleet, places: Sequence[PlaceSpec], since: dict[str, Ns]) -> None:
     """Do the work of one period; *since* has the time from which each vehicle has been standing."""
     now = kernel.now()
     for name, autopilot in fleet.autopilots.items():
@@ -63,7 +63,7 @@ def _serve(kernel: Kernel, fleet: SimulatedFleet, places: Sequence[Place], since
             kernel.record(BatteryService(now, name, place.name, "charge", SERVICE_PERIOD, left))
 
 
-def _nearest(places: Sequence[Place], truth: Truth) -> Place | None:
+def _nearest(places: Sequence[PlaceSpec], truth: Truth) -> PlaceSpec | None:
     """Return the place that a vehicle stands at, None if it is at none of them."""
     east, north, _ = truth.position
     away, place = min(
@@ -72,7 +72,7 @@ def _nearest(places: Sequence[Place], truth: Truth) -> Place | None:
     return place if away <= REACH_M else None
 
 
-def serve_loads(kernel: Kernel, fleet: SimulatedFleet, loads: Sequence[Load]) -> None:
+def serve_loads(kernel: Kernel, fleet: SimulatedFleet, loads: Sequence[CarriedLoad]) -> None:
     """Let grippers take and release *loads*, from now on."""
     if loads:
         kernel.every(GRIP_PERIOD, _Loads(kernel, fleet, loads).look)
@@ -85,11 +85,11 @@ class _Loads:
     that opens lets it fall.
     """
 
-    def __init__(self, kernel: Kernel, fleet: SimulatedFleet, loads: Sequence[Load]) -> None:
+    def __init__(self, kernel: Kernel, fleet: SimulatedFleet, loads: Sequence[CarriedLoad]) -> None:
         self._kernel = kernel
         self._fleet = fleet
-        self._lying = {one.name: (one.at.east_m, one.at.north_m) for one in loads}
-        self._masses = {one.name: one.mass_kg for one in loads}
+        self._lying = {load.name: (load.at.east_m, load.at.north_m) for load in loads}
+        self._masses = {load.name: load.mass_kg for load in loads}
         self._carried: dict[str, str] = {}
         self._grippers: dict[str, int | None] = {}
 

@@ -18,7 +18,7 @@ from volery.bridge.node_interface import BODY, stamped
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.model.added_sensors import Odometry
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.ros.graph import DEFAULT, LATCHED, EmbeddedGraph, Node, QoS, RosGraph
 from volery.ros.messages import new
 
@@ -34,9 +34,13 @@ ODOM = "odom"
 _ODOMETRY = "nav_msgs/msg/Odometry"
 
 
-def frames_of(vehicles: Sequence[Vehicle]) -> dict[str, str]:
+def frames_of(vehicles: Sequence[VehicleSpec]) -> dict[str, str]:
     """Return what the frames of each vehicle begin with: its name if several vehicles have such frames."""
-    framed = [one.name for one in vehicles if any(not isinstance(each, str) for each in one.added_sensors)]
+    framed = [
+        vehicle.name
+        for vehicle in vehicles
+        if any(not isinstance(each, str) for each in vehicle.added_sensors)
+    ]
     return {name: f"{name}/" if len(framed) > 1 else "" for name in framed}
 
 
@@ -54,7 +58,7 @@ class SensorNode(NamedTuple):
 
     graph: RosGraph
     flight: Flight
-    vehicle: Vehicle
+    vehicle: VehicleSpec
     context: ExecutionContext
     alterations: Mapping[str, Mapping[str, Alteration]]
     prefix: str = ""
@@ -62,12 +66,14 @@ class SensorNode(NamedTuple):
     @property
     def moves_frames(self) -> bool:
         """Whether it publishes where ``base_link`` is."""
-        return any(isinstance(one, Odometry) for one in self.vehicle.added_sensors)
+        return any(isinstance(sensor, Odometry) for sensor in self.vehicle.added_sensors)
 
     def serve(self) -> None:
         """Publish each sample of the vehicle's added sensors below ``/VEHICLE``, until the end of the run."""
         sensors = self.flight.added_sensors()
-        drives = {one.name: partial(self._drive, sensor=one) for one in sensors if one.publications()}
+        drives = {
+            sensor.name: partial(self._drive, sensor=sensor) for sensor in sensors if sensor.publications()
+        }
         for one in self.vehicle.added_sensors:
             if isinstance(one, Odometry):
                 drives[one.named] = partial(self._drive_odometry, odometry=one)
@@ -87,10 +93,10 @@ class SensorNode(NamedTuple):
         """Publish where the sensors are on the body; late subscriptions receive it from the graph."""
         at = self.graph.epoch
         places = [
-            transform(at, f"{self.prefix}{BODY}", f"{self.prefix}{one.frame}", ros_quaternion(turn), place)
-            for one in sensors
-            if one.mounting is not None
-            for place, turn in (one.mounting,)
+            transform(at, f"{self.prefix}{BODY}", f"{self.prefix}{sensor.frame}", ros_quaternion(turn), place)
+            for sensor in sensors
+            if sensor.mounting is not None
+            for place, turn in (sensor.mounting,)
         ]
         if places:
             node.advertise(TF_STATIC, TF_MESSAGE, LATCHED).publish(new(TF_MESSAGE, transforms=places))
@@ -107,7 +113,10 @@ class SensorNode(NamedTuple):
 
     def _drive(self, node: Node, sensor: SampledSensor) -> None:
         """Publish the samples of one sensor as they come."""
-        advertised = [(one, node.advertise(one.topic, one.type, DEFAULT)) for one in sensor.publications()]
+        advertised = [
+            (publication, node.advertise(publication.topic, publication.type, DEFAULT))
+            for publication in sensor.publications()
+        ]
         rate = node.rate(sensor.period)
         while not node.closed:
             rate.sleep()

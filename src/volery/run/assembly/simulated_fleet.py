@@ -21,12 +21,12 @@ from volery.base.seeds import stream
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Codec, Link
+from volery.links.link import Link, WireFormat
 from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
 from volery.model.environment import Environment, Prism
-from volery.model.environment import Marker as MarkerModel
-from volery.model.environment import Vehicle as VehicleModel
-from volery.model.environment import Wind as WindModel
+from volery.model.environment import MarkerSpec as MarkerModel
+from volery.model.environment import VehicleSpec as VehicleModel
+from volery.model.environment import WindSpec as WindModel
 from volery.run.assembly.bodies import body_of
 from volery.run.assembly.firmware_programs import (
     ProgramFolder,
@@ -57,7 +57,7 @@ LUX = {"day": DAY_LUX, "dusk": DUSK_LUX, "night": 0.3}
 """Illuminance of the model's kinds of light."""
 
 
-class Surroundings(NamedTuple):
+class FleetWorld(NamedTuple):
     """The world that the vehicles share: its frame, its wind and what stands in it."""
 
     frame: LocalFrame
@@ -83,7 +83,7 @@ class SimulatedFleet:
         self,
         kernel: Kernel,
         vehicles: Sequence[VehicleModel],
-        surroundings: Surroundings,
+        surroundings: FleetWorld,
         seed: int,
         *,
         systems: Mapping[str, int] | None = None,
@@ -120,7 +120,9 @@ class SimulatedFleet:
         self._collisions = dict.fromkeys((vehicle.name for vehicle in vehicles), 0)
         self.on_collision: Callable[[Collision], object] = ignore
         """Called with each collision, when it is recorded."""
-        self.alterations: dict[str, dict[str, dict[str, Alteration]]] = {one.name: {} for one in vehicles}
+        self.alterations: dict[str, dict[str, dict[str, Alteration]]] = {
+            vehicle.name: {} for vehicle in vehicles
+        }
         """What faults make of the samples of added sensors: by vehicle, sensor and fault."""
         self._families: dict[str, AutopilotFamily] = {}
         ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
@@ -170,7 +172,7 @@ class SimulatedFleet:
         """Return the firmware of a vehicle."""
         return self._families[vehicle]
 
-    def codec(self, vehicle: str) -> Codec:
+    def codec(self, vehicle: str) -> WireFormat:
         """Return the codec of a vehicle's links.
 
         Raises:
@@ -302,16 +304,18 @@ def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
     return {name: stated[name] if name in stated else next(free) for name in names}
 
 
-def surroundings_of(environment: Environment) -> Surroundings:
+def surroundings_of(environment: Environment) -> FleetWorld:
     """Return the world of a model's environment."""
     solids, no_fly = _solids(environment.solids), _solids(environment.no_fly_zones)
     markers = _markers(environment.markers, Scene(solids))
     scene = Scene(solids, no_fly, markers=markers, lux=LUX[environment.light])
-    return Surroundings(environment.origin, environment.wind, scene)
+    return FleetWorld(environment.origin, environment.wind, scene)
 
 
 def _solids(prisms: Sequence[Prism]) -> list[Solid]:
-    return [Solid(one.name, one.corners, one.floor_m or -FOUNDATION, one.ceiling_m) for one in prisms]
+    return [
+        Solid(prism.name, prism.corners, prism.floor_m or -FOUNDATION, prism.ceiling_m) for prism in prisms
+    ]
 
 
 def _markers(markers: Sequence[MarkerModel], scene: Scene) -> list[Marker]:
@@ -323,13 +327,13 @@ def _markers(markers: Sequence[MarkerModel], scene: Scene) -> list[Marker]:
 
     return [
         Marker(
-            one.name,
-            marker_cells(one.family, one.number),
-            (one.at.east_m, one.at.north_m, scene.standing_height(one.at.east_m, one.at.north_m)),
-            one.size_m,
-            radians(one.yaw_deg),
+            marker.name,
+            marker_cells(marker.family, marker.number),
+            (marker.at.east_m, marker.at.north_m, scene.standing_height(marker.at.east_m, marker.at.north_m)),
+            marker.size_m,
+            radians(marker.yaw_deg),
         )
-        for one in markers
+        for marker in markers
     ]
 
 
@@ -352,7 +356,7 @@ def fleet_of(
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
-    around = Surroundings(first.frame, first.wind)
+    around = FleetWorld(first.frame, first.wind)
     fleet = SimulatedFleet(
         kernel,
         vehicles,

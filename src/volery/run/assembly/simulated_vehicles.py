@@ -14,7 +14,15 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, from_seconds
 from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, parse_wire_faults
-from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Firmware, Place, Vehicle, Wind
+from volery.model.environment import (
+    SENSOR_SETS,
+    STARTS,
+    VEHICLE_KINDS,
+    FirmwareProgram,
+    PlaceSpec,
+    VehicleSpec,
+    WindSpec,
+)
 from volery.model.fmu_bodies import Fmu
 from volery.simulation.real_firmware.program_search import PROGRAMS
 from volery.vehicles.address import Address
@@ -72,9 +80,9 @@ class SimulatedVehicle:
         transmitter: Movements of the pilot's transmitter: time ns, channel from 1, pulse width µs.
     """
 
-    vehicle: Vehicle
+    vehicle: VehicleSpec
     frame: LocalFrame
-    wind: Wind
+    wind: WindSpec
     faults: WireFaults | None = None
     system: int | None = None
     names: str = ""
@@ -110,11 +118,11 @@ def parse_simulated(
         home = Position(stated[0], stated[1], AMSL(stated[2]))
     latitude, longitude, amsl = home.latitude, home.longitude, home.altitude.metres
     kind = _one_of(address, "kind", VEHICLE_KINDS, kind)
-    vehicle = Vehicle(
+    vehicle = VehicleSpec(
         name=name,
         kind=kind,
         autopilot=address.driver,
-        at=Place("home", latitude, longitude, amsl, 0.0, 0.0, "home"),
+        at=PlaceSpec("home", latitude, longitude, amsl, 0.0, 0.0, "home"),
         heading_deg=address.number("heading", 0.0),
         sensors=_one_of(address, "sensors", SENSOR_SETS, "consumer"),
         started=_one_of(address, "start", STARTS, "cold"),
@@ -124,7 +132,7 @@ def parse_simulated(
         firmware=_firmware(address, kind) if real else None,
         body=_body(address, kind),
     )
-    wind = Wind(*(address.numbers("wind", 3) or ()))
+    wind = WindSpec(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)
     names = address.options.get("names", "")
     return SimulatedVehicle(
@@ -148,11 +156,11 @@ def _body(address: Address, kind: str) -> Fmu | None:
     return Fmu(Path(file).absolute())
 
 
-def _firmware(address: Address, kind: str) -> Firmware:
+def _firmware(address: Address, kind: str) -> FirmwareProgram:
     usual = PROGRAMS[address.driver].programs if address.driver in PROGRAMS else {}
     program = address.options.get("program") or usual.get(kind, address.driver)
-    files = tuple(Path(one) for one in address.options.get("file", "").split(",") if one)
-    return Firmware(program, files, _one_of(address, "repeatable", ("0", "1"), "0") == "1")
+    files = tuple(Path(word) for word in address.options.get("file", "").split(",") if word)
+    return FirmwareProgram(program, files, _one_of(address, "repeatable", ("0", "1"), "0") == "1")
 
 
 def _transmitter(address: Address) -> tuple[tuple[Ns, int, int], ...]:

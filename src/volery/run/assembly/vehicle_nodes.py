@@ -30,12 +30,12 @@ from volery.base.seeds import stream
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Codec, Link
+from volery.links.link import Link, WireFormat
 from volery.links.wire_faults import REORDER_DELAY, WireFaults
-from volery.model.environment import Vehicle
+from volery.model.environment import VehicleSpec
 from volery.ros.graph import EmbeddedGraph, RosGraph
 from volery.ros.graph.interface import NodeId, Route
-from volery.ros.messages import Message, cdr_size
+from volery.ros.messages import RosMessage, cdr_size
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.vehicles.driver import Driver, Opener, drivers
 
@@ -64,7 +64,7 @@ class GraphWire:
         """Apply *faults* to the messages in both directions from now on."""
         self._faults = faults
 
-    def size_of(self, message: Message) -> int:
+    def size_of(self, message: RosMessage) -> int:
         """Return the size of a message where it matters, for bits that flip; else 0."""
         return cdr_size(message) if self._faults.flip else 0
 
@@ -180,12 +180,12 @@ def own_names(names: str) -> bool:
     return any(names in valid for valid in OWN_NAMES.values())
 
 
-def use_message_versions(vehicles: Iterable[Vehicle]) -> None:
+def use_message_versions(vehicles: Iterable[VehicleSpec]) -> None:
     """Define messages as the firmwares have them whose own names the nodes of *vehicles* have.
 
     It is done before anything uses messages: before components are compiled, and when a node begins.
     """
-    names = [one.names for one in vehicles if own_names(one.names)]
+    names = [vehicle.names for vehicle in vehicles if own_names(vehicle.names)]
     if names:
         from volery.bridge import MAVLINK_SCHEMES  # loads all messages
 
@@ -198,12 +198,12 @@ def topics_below(names: str) -> str:
     return {"px4": "fmu/", "ardupilot": "ap/"}.get(names.partition("-")[0], "")
 
 
-def at_root(vehicle: Vehicle, vehicles: Iterable[Vehicle]) -> bool:
+def at_root(vehicle: VehicleSpec, vehicles: Iterable[VehicleSpec]) -> bool:
     """Return whether the names of the node of a vehicle lie below ``/``.
 
     Those of an autopilot's own interface do, as on an aircraft, unless several of *vehicles* have them.
     """
-    return own_names(vehicle.names) and sum(own_names(one.names) for one in vehicles) == 1
+    return own_names(vehicle.names) and sum(own_names(vehicle.names) for vehicle in vehicles) == 1
 
 
 SIMULATED_LINK_OPTIONS = {"texts": "unrecorded"}
@@ -238,7 +238,7 @@ def graph_access(autopilot: str, vehicle: str) -> GraphAccess:
     return GraphAccess(factory.on_graph, factory.namespace.format(name=vehicle))
 
 
-def names_of(vehicle: Vehicle, codec: Codec | None, commanded: bool) -> str:
+def names_of(vehicle: VehicleSpec, codec: WireFormat | None, commanded: bool) -> str:
     """Return whose names the node of *vehicle* has, as a model states them; empty for a node of its own.
 
     Raises:

@@ -20,7 +20,7 @@ from volery.base.errors import UsageError
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.model.components import Signature
 from volery.model.system import System
-from volery.ros.messages import Message, new, request
+from volery.ros.messages import RosMessage, new, request
 
 PRIMITIVES = {"str": "string", "bool": "bool", "int": "int64", "float": "float64"}
 _PYTHON: Mapping[str, tuple[type, ...]] = {
@@ -54,7 +54,7 @@ def package_name(*parts: str) -> str:
 
 
 @dataclass(frozen=True)
-class _Record:
+class _Dataclass:
     """A dataclass: the file beside the components that defines it, and the types of its fields."""
 
     file: Path
@@ -85,7 +85,7 @@ class CallTypes:
     package: str
     definitions: Mapping[str, str]
     operations: Mapping[tuple[str, str], OperationType]
-    records: Mapping[str, _Record] = field(default_factory=dict)
+    records: Mapping[str, _Dataclass] = field(default_factory=dict)
 
     def files(self) -> tuple[Path, ...]:
         """Return the files of the dataclasses that messages are made of."""
@@ -94,7 +94,7 @@ class CallTypes:
 
     def request(
         self, kind: OperationType, args: tuple[Any, ...], kwargs: dict[str, Any], what: str
-    ) -> Message:
+    ) -> RosMessage:
         """Return the request of a call. Raises ``UsageError`` naming *what* for values of other types."""
         names = [name for name, _ in kind.arguments]
         given = dict(zip(names, args, strict=False)) | kwargs
@@ -105,22 +105,22 @@ class CallTypes:
         fields = {
             name: self._to_field(given[name], type_, f"{what}: {name}") for name, type_ in kind.arguments
         }
-        made: Message = request(kind.name, **fields)
+        made: RosMessage = request(kind.name, **fields)
         return made
 
     def arguments(self, kind: OperationType, asked: Any, find: Find) -> dict[str, Any]:
         """Return the arguments of a request by name."""
         return {name: self._from_field(getattr(asked, name), type_, find) for name, type_ in kind.arguments}
 
-    def response(self, kind: OperationType, result: Any, what: str) -> Message:
+    def response(self, kind: OperationType, result: Any, what: str) -> RosMessage:
         """Return the response with a result; raise ``UsageError`` naming *what* if it is of another type."""
         fields = {"result": self._to_field(result, kind.returns, what)} if kind.returns else {}
-        made: Message = new(f"{kind.name}_Response", done=True, **fields)
+        made: RosMessage = new(f"{kind.name}_Response", done=True, **fields)
         return made
 
-    def failure(self, kind: OperationType, error: str) -> Message:
+    def failure(self, kind: OperationType, error: str) -> RosMessage:
         """Return the response of an operation that failed."""
-        made: Message = new(f"{kind.name}_Response", done=False, error=error)
+        made: RosMessage = new(f"{kind.name}_Response", done=False, error=error)
         return made
 
     def result(self, kind: OperationType, answer: Any, find: Find) -> Any:
@@ -205,10 +205,14 @@ def call_types(system: System) -> CallTypes:
     return CallTypes(package, texts, operations, records)
 
 
-def _records(system: System) -> dict[str, _Record]:
+def _records(system: System) -> dict[str, _Dataclass]:
     """Return the dataclasses of the Python files beside the components, by name."""
-    folders = {system.file_of(one.component).parent: None for one in system.instances if one.component.path}
-    found: dict[str, _Record] = {}
+    folders = {
+        system.file_of(instance.component).parent: None
+        for instance in system.instances
+        if instance.component.path
+    }
+    found: dict[str, _Dataclass] = {}
     for file in (file for folder in folders for file in sorted(folder.glob("*.py"))):
         try:
             tree = ast.parse(file.read_bytes())
@@ -221,7 +225,7 @@ def _records(system: System) -> dict[str, _Record]:
                     for one in node.body
                     if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name)
                 }
-                found.setdefault(node.name, _Record(file, fields))
+                found.setdefault(node.name, _Dataclass(file, fields))
     return found
 
 
@@ -232,13 +236,13 @@ def _is_dataclass(node: ast.ClassDef) -> bool:
 def _element(type_: str) -> str:
     """Return the type of the elements of a list type, empty for any other type."""
     match = _LIST.match(type_)
-    return next((one.strip() for one in match.groups() if one), "") if match else ""
+    return next((group.strip() for group in match.groups() if group), "") if match else ""
 
 
-def _used(signature: Signature, records: Mapping[str, _Record]) -> list[str] | None:
+def _used(signature: Signature, records: Mapping[str, _Dataclass]) -> list[str] | None:
     """Return the messages that an operation needs, None if one of its types cannot be a message."""
     used: dict[str, None] = {}
-    waiting = [(one.name, one.type) for one in signature.arguments]
+    waiting = [(argument.name, argument.type) for argument in signature.arguments]
     waiting += [("result", signature.returns)] if signature.returns else []
     while waiting:
         name, type_ = waiting.pop()
@@ -256,12 +260,12 @@ def _used(signature: Signature, records: Mapping[str, _Record]) -> list[str] | N
 
 
 def _service_text(signature: Signature, package: str) -> str:
-    asked = "".join(f"{_field(one.type, package)} {one.name}\n" for one in signature.arguments)
+    asked = "".join(f"{_field(argument.type, package)} {argument.name}\n" for argument in signature.arguments)
     result = f"{_field(signature.returns, package)} result\n" if signature.returns else ""
     return f"{asked}---\nbool done\nstring error\n{result}"
 
 
-def _message_text(name: str, records: Mapping[str, _Record], package: str) -> str:
+def _message_text(name: str, records: Mapping[str, _Dataclass], package: str) -> str:
     if name == POSITION:
         return _POSITION_TEXT
     return "".join(f"{_field(type_, package)} {one}\n" for one, type_ in records[name].fields.items())

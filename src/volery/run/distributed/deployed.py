@@ -67,8 +67,8 @@ class DeployedRun:
     def __init__(self, kernel: VirtualKernel, ending: Ending, graph: TransportGraph, system: System) -> None:
         self.kernel, self._ending, self._graph = kernel, ending, graph
         self._nodes = {
-            one.name: full_node_name(plan.node_label(one), one.namespace)
-            for one in plan.worker_instances(system)
+            instance.name: full_node_name(plan.node_label(instance), instance.namespace)
+            for instance in plan.worker_instances(system)
         }
         self.components = {name: DeployedComponent(name, self) for name in self._nodes}
 

@@ -74,7 +74,7 @@ class _ToRun:
         raise EOFError
 
 
-class Host(Worker):
+class ComponentHost(Worker):
     """One component of a deployed system."""
 
     def __init__(self, order: pipe.WorkerOrder, *, simulated: bool) -> None:
@@ -216,7 +216,9 @@ def main(model: Path, name: str, *, graph: str, allocation: str = "", scenario: 
         if given.parameters is not None:
             system = with_parameters(system, name, given.parameters)
         system, _ = plan.without_computers(system)
-        well = Host(pipe.WorkerOrder(system, name, graph, seed=1), simulated=given.simulated == "true").run()
+        well = ComponentHost(
+            pipe.WorkerOrder(system, name, graph, seed=1), simulated=given.simulated == "true"
+        ).run()
     except VoleryError as error:
         print(f"volery: {error}", file=sys.stderr, flush=True)  # noqa: T201
         os._exit(2)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, cast
 from volery.components.instance import Allocation
 from volery.cost import FREE, Pricing
 from volery.model.instances import Instance
-from volery.model.system import Bound, System
+from volery.model.system import RequiredBound, System
 from volery.ros.graph.interface import full_node_name
-from volery.run.assembly.computers import Platform, commanded_by
+from volery.run.assembly.computers import ComputingPlatform, commanded_by
 from volery.run.assembly.vehicle_nodes import names_of
 from volery.vehicles.driver import drivers
 
@@ -51,18 +51,22 @@ BY_TRUTH = frozenset(("landing_offset",))
 
 def worker_instances(system: System) -> tuple[Instance, ...]:
     """Return the instances of the application, which get their own processes."""
-    return tuple(one for one in system.instances if not one.is_environment)
+    return tuple(instance for instance in system.instances if not instance.is_environment)
 
 
 def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
     """Return *system* without processors, and the names of the requirements that need them."""
-    vehicles = {one.name for one in system.vehicles}
-    left_out = tuple(one.name for one in system.requirements if _is_about_computing(one, vehicles))
+    vehicles = {vehicle.name for vehicle in system.vehicles}
+    left_out = tuple(
+        requirement.name for requirement in system.requirements if _is_about_computing(requirement, vehicles)
+    )
     made = replace(
         system,
         processors=(),
         networks=(),
-        requirements=tuple(one for one in system.requirements if one.name not in left_out),
+        requirements=tuple(
+            requirement for requirement in system.requirements if requirement.name not in left_out
+        ),
     )
     return made, left_out
 
@@ -72,8 +76,12 @@ def without_truth(system: System) -> tuple[System, tuple[str, ...]]:
 
     Processes that others started have no access to it. The names of those requirements are returned, too.
     """
-    left_out = tuple(one.name for one in system.requirements if one.observe.rpartition(".")[2] in BY_TRUTH)
-    kept = tuple(one for one in system.requirements if one.name not in left_out)
+    left_out = tuple(
+        requirement.name
+        for requirement in system.requirements
+        if requirement.observe.rpartition(".")[2] in BY_TRUTH
+    )
+    kept = tuple(requirement for requirement in system.requirements if requirement.name not in left_out)
     return replace(system, requirements=kept), left_out
 
 
@@ -86,20 +94,20 @@ def vehicles_on_graph(system: System) -> tuple[dict[str, str], list[str]]:
         if by_port or vehicle.processor is not None:
             factory = drivers.load(vehicle.autopilot)
             found[vehicle.name] = names_of(vehicle, factory.codec if factory.on_link else None, by_port)
-    return found, [one.name for one in system.vehicles if one.name not in found]
+    return found, [vehicle.name for vehicle in system.vehicles if vehicle.name not in found]
 
 
 def unallocated(system: System) -> System:
     """Return *system* with no component or vehicle on a processor, as it is accounted for."""
-    vehicles = tuple(replace(one, processor=None) for one in system.environment.vehicles)
+    vehicles = tuple(replace(vehicle, processor=None) for vehicle in system.environment.vehicles)
     return replace(
         system,
-        instances=tuple(replace(one, processor=None) for one in system.instances),
+        instances=tuple(replace(instance, processor=None) for instance in system.instances),
         environment=replace(system.environment, vehicles=vehicles),
     )
 
 
-class HostPlatform(Platform):
+class HostPlatform(ComputingPlatform):
     """Platform of this machine: computing takes real time and is not priced."""
 
     def __init__(self, system: System, kernel: Kernel, seed: int, fidelity: str) -> None:
@@ -121,7 +129,7 @@ class HostPlatform(Platform):
         """In no time."""
 
 
-def _is_about_computing(bound: Bound, vehicles: Collection[str]) -> bool:
+def _is_about_computing(bound: RequiredBound, vehicles: Collection[str]) -> bool:
     subject, _, quantity = bound.observe.rpartition(".")
     return quantity in COMPUTING or (quantity == "energy" and subject not in vehicles)
 

@@ -21,7 +21,7 @@ from volery.model.system import System
 from volery.ros.graph.interface import CLOCK_PERIOD
 from volery.ros.transports.client_library import pending_calls
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart, Truth
-from volery.run.assembly.computers import Platform
+from volery.run.assembly.computers import ComputingPlatform
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
 from volery.run.distributed.call_types import call_types
@@ -181,13 +181,13 @@ class DistributedRun:
         self._truth: Callable[[str], Truth]
         self.graph = open_graph(kernel, settings.graph, start_master=True, epoch=0)
 
-    def build(self, platform: Platform, fleet: SimulatedFleet) -> BuiltComponents:
+    def build(self, platform: ComputingPlatform, fleet: SimulatedFleet) -> BuiltComponents:
         """Build the components of the environment, which stay in this process."""
         kernel, system = self._kernel, self._system
         self._node = node = self.graph.node(plan.NODE)
         self._truth = fleet.truth
         self._values = ValueCodec(self._beside)
-        self._here = tuple(one for one in system.instances if one.is_environment)
+        self._here = tuple(instance for instance in system.instances if instance.is_environment)
         types = call_types(system) if self._settings.deployed else None
         self._formats = CallFormats(system, self._values, self._beside, types)
         part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._formats))
@@ -197,7 +197,11 @@ class DistributedRun:
 
     def _beside(self, module: str) -> ModuleType | None:
         """Load a module beside any component: a received value may be of a class that is not loaded yet."""
-        files = [self._system.file_of(one.component) for one in self._system.instances if one.component.path]
+        files = [
+            self._system.file_of(instance.component)
+            for instance in self._system.instances
+            if instance.component.path
+        ]
         found = (self._built.loader.sibling(module, folder) for folder in {file.parent: 0 for file in files})
         return next((one for one in found if one is not None), None)
 
@@ -227,7 +231,7 @@ class DistributedRun:
             ]
         self._ending.vehicles = self._processes
         end = time.monotonic() + JOIN_WITHIN_S
-        while late := [one for one in self._processes if not one.ready]:
+        while late := [process for process in self._processes if not process.ready]:
             for one in late:
                 one.check()
             if time.monotonic() > end:
@@ -261,6 +265,6 @@ class DistributedRun:
         if self._closed:
             return []
         self._closed = True
-        killed = [one.name for one in self._processes if not one.stop()]
+        killed = [process.name for process in self._processes if not process.stop()]
         self.graph.close()
         return killed

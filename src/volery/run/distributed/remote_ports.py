@@ -16,9 +16,9 @@ from typing import Any, Protocol
 
 from volery.base.errors import ComponentError, UsageError, VoleryError
 from volery.base.time import Ns, S
-from volery.components.instance import Instance
+from volery.components.instance import RunningInstance
 from volery.components.loader import SHARED_MODULE_PREFIX, USER_MODULE_PREFIX
-from volery.components.ports import Port, invoke
+from volery.components.ports import ComponentPort, invoke
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import current_task
@@ -26,7 +26,7 @@ from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
 from volery.ros.graph.work import Work
-from volery.ros.messages import Message, define_all, request, service
+from volery.ros.messages import RosMessage, define_all, request, service
 from volery.run.distributed.call_types import CallTypes, Find, OperationType
 from volery.run.distributed.plan import NODE, operations, service_name
 
@@ -66,7 +66,7 @@ class ValueCodec:
             return cls[content]
         if not is_dataclass(cls):
             raise ValueError(f"{kind} is no dataclass")
-        made = cls(**{one.name: content.pop(one.name) for one in fields(cls) if one.init})
+        made = cls(**{field.name: content.pop(field.name) for field in fields(cls) if field.init})
         for name, value in content.items():
             object.__setattr__(made, name, value)
         return made
@@ -91,7 +91,7 @@ def _encode(value: object, what: str) -> Any:
         if isinstance(value, kind):
             return code(value, what)
     if is_dataclass(value) and not isinstance(value, type):
-        content = {one.name: _encode(getattr(value, one.name), what) for one in fields(value)}
+        content = {field.name: _encode(getattr(value, field.name), what) for field in fields(value)}
         return {_KIND: _name(value, what), "value": content}
     raise _unfit(value, what)
 
@@ -147,16 +147,16 @@ class CallFormat(Protocol):
 
     type: str
 
-    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> RosMessage:
         """Return the request; raise ``UsageError`` that names *what* if a value cannot be sent."""
 
     def arguments(self, asked: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
         """Return the arguments of a request, by position and by name."""
 
-    def response(self, result: Any, what: str) -> Message:
+    def response(self, result: Any, what: str) -> RosMessage:
         """Return the response with a result; raise ``UsageError`` that names *what*."""
 
-    def failure(self, error: str) -> Message:
+    def failure(self, error: str) -> RosMessage:
         """Return the response of an operation that failed."""
 
     def error(self, answer: Any) -> str:
@@ -174,9 +174,9 @@ class JsonCalls:
     def __init__(self, values: ValueCodec) -> None:
         self._values = values
 
-    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> RosMessage:
         """See ``CallFormat``."""
-        made: Message = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
+        made: RosMessage = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
         return made
 
     def arguments(self, asked: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
@@ -184,14 +184,14 @@ class JsonCalls:
         args, kwargs = self._values.from_text(asked.arguments)
         return tuple(args), kwargs
 
-    def response(self, result: Any, what: str) -> Message:
+    def response(self, result: Any, what: str) -> RosMessage:
         """See ``CallFormat``."""
-        made: Message = service(CALL).response(True, self._values.to_text(result, what))
+        made: RosMessage = service(CALL).response(True, self._values.to_text(result, what))
         return made
 
-    def failure(self, error: str) -> Message:
+    def failure(self, error: str) -> RosMessage:
         """See ``CallFormat``."""
-        made: Message = service(CALL).response(False, error)
+        made: RosMessage = service(CALL).response(False, error)
         return made
 
     def error(self, answer: Any) -> str:
@@ -210,7 +210,7 @@ class TypedCalls:
         self.type = kind.name
         self._types, self._kind, self._find = types, kind, find
 
-    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> RosMessage:
         """See ``CallFormat``."""
         return self._types.request(self._kind, args, kwargs, what)
 
@@ -218,11 +218,11 @@ class TypedCalls:
         """See ``CallFormat``."""
         return (), self._types.arguments(self._kind, asked, self._find)
 
-    def response(self, result: Any, what: str) -> Message:
+    def response(self, result: Any, what: str) -> RosMessage:
         """See ``CallFormat``."""
         return self._types.response(self._kind, result, what)
 
-    def failure(self, error: str) -> Message:
+    def failure(self, error: str) -> RosMessage:
         """See ``CallFormat``."""
         return self._types.failure(self._kind, error)
 
@@ -258,7 +258,7 @@ _DISCOVERY: Ns = 10 * S
 """Longest wait for the server of an operation before its first call."""
 
 
-class RemotePort(Port):
+class RemotePort(ComponentPort):
     """Port to a component of another process.
 
     A call raises ``ComponentError`` that names the callee if the operation fails or its process is gone.
@@ -268,7 +268,7 @@ class RemotePort(Port):
         self,
         kernel: Kernel,
         caller: str,
-        callee: Instance,
+        callee: RunningInstance,
         clients: Mapping[str, Client],
         formats: Mapping[str, CallFormat],
     ) -> None:
@@ -306,7 +306,7 @@ class PortClients:
     def __call__(self, caller: InstanceModel, callee: InstanceModel) -> RemotePort:
         """Return the port of *caller* in this process to *callee* in another."""
         provided = operations(self._system, callee)
-        far = Instance(self._kernel, callee.name, operations=provided)
+        far = RunningInstance(self._kernel, callee.name, operations=provided)
         formats = {name: self._formats.of(callee, name) for name in provided}
         clients = {name: self._client(service_name(callee, name), formats[name].type) for name in provided}
         return RemotePort(self._kernel, caller.name, far, clients, formats)
@@ -325,7 +325,7 @@ class PortServer:
         self._kernel, self._node, self._formats, self._scope = kernel, node, formats, scope
         self._group = node.group(self._start)
 
-    def serve(self, model: InstanceModel, instance: Instance) -> None:
+    def serve(self, model: InstanceModel, instance: RunningInstance) -> None:
         """Advertise the operations of *instance*."""
         for operation in instance.operations:
             written = self._formats.of(model, operation)
@@ -335,7 +335,9 @@ class PortServer:
     def _start(self, work: Work) -> None:
         self._kernel.spawn(work.run, f"{NODE} (call)", ExecutionContext(NODE), self._scope)
 
-    def _answer(self, instance: Instance, operation: str, written: CallFormat, asked: Any) -> Message:
+    def _answer(
+        self, instance: RunningInstance, operation: str, written: CallFormat, asked: Any
+    ) -> RosMessage:
         try:
             args, kwargs = written.arguments(asked)
             with instance.serving(current_task(self._kernel), operation) as thing:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.ros.graph.interface import QoS
-from volery.ros.messages import Message, new
+from volery.ros.messages import RosMessage, new
 from volery.run.distributed.pipe import Begin, EndingBegun, Ready, StartFailed, Stop
 from volery.trace.events import Call, Failure, Milestone, Operation, Text
 
@@ -39,10 +39,10 @@ def is_sent(thing: object) -> bool:
     return type(thing).__name__ in _KINDS
 
 
-def to_message(sender: str, content: Any) -> Message:
+def to_message(sender: str, content: Any) -> RosMessage:
     """Return the message of the graph."""
     text = json.dumps({"from": sender, "kind": type(content).__name__, "fields": list(content)})
-    made: Message = new(MESSAGE_TYPE, data=text)
+    made: RosMessage = new(MESSAGE_TYPE, data=text)
     return made
 
 

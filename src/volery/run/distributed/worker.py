@@ -23,7 +23,7 @@ from volery.components.loader import Loader
 from volery.kernel.task import ExecutionContext
 from volery.kernel.wall import FollowingKernel, WallKernel
 from volery.requirements.record import Status
-from volery.ros.graph.unserved import Surroundings
+from volery.ros.graph.unserved import KnownParticipants
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
@@ -122,7 +122,7 @@ class Worker:
 
     def _report_unserved(self) -> None:
         names = (self._model.name, plan.node_label(self._model))
-        found = self.graph.unserved(Surroundings(names, *plan.vehicles_on_graph(self._system)))
+        found = self.graph.unserved(KnownParticipants(names, *plan.vehicles_on_graph(self._system)))
         for one in found:
             self._record(one)
 

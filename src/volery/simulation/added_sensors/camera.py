@@ -11,9 +11,9 @@ from volery.base.errors import UsageError
 from volery.base.frames import Vector, body_to_world, multiply, world_to_body
 from volery.base.time import Ns
 from volery.simulation.added_sensors.depth_camera import OPTICAL
-from volery.simulation.world.rasteriser import Exposure, Lens, Picture, Rasteriser, View
+from volery.simulation.world.rasteriser import CameraView, Exposure, Lens, Picture, Rasteriser
 from volery.simulation.world.scene import Scene
-from volery.simulation.world.sensors import Mounting, Publication, SampledSensor, SensorInput
+from volery.simulation.world.sensors import Mounting, SampledSensor, SensorInput, SensorMessage
 
 
 class Shot(NamedTuple):
@@ -28,7 +28,7 @@ class Shot(NamedTuple):
     """
 
     rasteriser: Rasteriser
-    view: View
+    view: CameraView
     ground: float
     lux: float
     number: int
@@ -51,7 +51,7 @@ class _CameraSampler:
         return Shot(self._rasteriser, view_of(state, self._mounting), state.ground, self._lux, k)
 
 
-def view_of(state: SensorInput, mounting: Mounting) -> View:
+def view_of(state: SensorInput, mounting: Mounting) -> CameraView:
     """Return where a camera on a body is and how it moves."""
     at, turn = mounting
     off = body_to_world(state.attitude, at)
@@ -63,7 +63,9 @@ def view_of(state: SensorInput, mounting: Mounting) -> View:
     swing: Vector = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
     moved = body_to_world(state.attitude, swing)
     vx, vy, vz = (one + by for one, by in zip(state.velocity, moved, strict=True))
-    return View((east, north, up), axes, world_to_body(whole, (vx, vy, vz)), world_to_body(turn, state.rates))
+    return CameraView(
+        (east, north, up), axes, world_to_body(whole, (vx, vy, vz)), world_to_body(turn, state.rates)
+    )
 
 
 @dataclass(frozen=True)
@@ -102,11 +104,11 @@ class Camera(SampledSensor):
         """See ``SampledSensor``."""
         return _CameraSampler(self, noise, scene)
 
-    def publications(self) -> tuple[Publication, ...]:
+    def publications(self) -> tuple[SensorMessage, ...]:
         """See ``SampledSensor``."""
         return (
-            Publication(f"{self.name}/image_raw", self.type, self.fill, on_demand=True),
-            Publication(f"{self.name}/camera_info", "sensor_msgs/msg/CameraInfo", self._fill_info),
+            SensorMessage(f"{self.name}/image_raw", self.type, self.fill, on_demand=True),
+            SensorMessage(f"{self.name}/camera_info", "sensor_msgs/msg/CameraInfo", self._fill_info),
         )
 
     def fill(self, message: Any, values: Any) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from volery.base.elementary import sine_cosine
 from volery.base.errors import UsageError
 from volery.simulation.added_sensors.beams import BeamSensor
-from volery.simulation.world.sensors import Publication
+from volery.simulation.world.sensors import SensorMessage
 from volery.simulation.world.state_layout import Array
 
 OPTICAL = (0.5, -0.5, 0.5, -0.5)
@@ -59,12 +59,12 @@ class DepthCamera(BeamSensor):
         ways = np.stack((right, down, np.ones_like(right)), axis=1)
         return np.ascontiguousarray(ways / np.sqrt((ways * ways).sum(axis=1))[:, None])
 
-    def publications(self) -> tuple[Publication, ...]:
+    def publications(self) -> tuple[SensorMessage, ...]:
         """See ``SampledSensor``."""
         below = f"{self.topic}/" if self.topic else ""
         return (
-            Publication(f"{below}depth/image_rect", "sensor_msgs/msg/Image", self.fill),
-            Publication(f"{below}depth/camera_info", "sensor_msgs/msg/CameraInfo", self.fill_info),
+            SensorMessage(f"{below}depth/image_rect", "sensor_msgs/msg/Image", self.fill),
+            SensorMessage(f"{below}depth/camera_info", "sensor_msgs/msg/CameraInfo", self.fill_info),
         )
 
     def fill(self, message: Any, values: Any) -> None:

@@ -1,9 +1,9 @@
 """A simulated autopilot: its firmware as data, and the object that runs one vehicle behind the protocol.
 
-The flight stack reads the groups of a ``Firmware`` and never branches on its name. What a ``Vehicle`` needs
-of its firmware stands in ``VehicleRules``; what manoeuvres and protocol endpoints need is passed to them
-directly. A protocol endpoint is one protocol of one vehicle: on any number of links, or as a node on a ROS
-graph.
+The flight stack reads the groups of a ``Firmware`` and never branches on its name. What an
+``AutopilotVehicle`` needs of its firmware stands in ``VehicleRules``; what manoeuvres and protocol endpoints
+need is passed to them directly. A protocol endpoint is one protocol of one vehicle: on any number of links,
+or as a node on a ROS graph.
 
 ```python
 world, flights = make_world(kernel.now, [Multirotor()], seed=7, frame=frame)
@@ -26,7 +26,7 @@ from volery.base.frames import Vector, ned_to_enu
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Codec, Link
+from volery.links.link import Link, WireFormat
 from volery.links.mavlink_codec import MAVLINK
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.fleet_autopilot import DefaultLink
@@ -34,7 +34,7 @@ from volery.simulation.autopilots.flight_recorder import FlightRecorder
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.protocol_endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
 from volery.simulation.autopilots.vehicle_state import (
-    Vehicle,
+    AutopilotVehicle,
     VehicleAction,
     VehicleRules,
     do_nothing,
@@ -59,11 +59,11 @@ class BootSequence(NamedTuple):
     """Called a moment later, when the estimator of a warm vehicle has a position."""
 
 
-class Failsafe(NamedTuple):
+class WatchedCondition(NamedTuple):
     """A condition that is checked regularly, and the actions when it begins and when it ends."""
 
     name: str
-    tripped: Callable[[Vehicle], bool]
+    tripped: Callable[[AutopilotVehicle], bool]
     begins: VehicleAction
     ends: VehicleAction = do_nothing
 
@@ -97,9 +97,9 @@ class Firmware:
     rules: VehicleRules
     boot: BootSequence
     periodic: PeriodicWork
-    failsafes: tuple[Failsafe, ...] = ()
+    failsafes: tuple[WatchedCondition, ...] = ()
     """In the order in which they are checked."""
-    endpoint: Callable[[Vehicle], ProtocolEndpoint]
+    endpoint: Callable[[AutopilotVehicle], ProtocolEndpoint]
     """Create the endpoint of the firmware's protocol (telemetry and commands)."""
 
 
@@ -117,7 +117,7 @@ class FirmwareFamily:
     name: str
     kinds: Mapping[str, Firmware]
     """Those of the newest version."""
-    codec: Codec | None = MAVLINK
+    codec: WireFormat | None = MAVLINK
     default_links: tuple[DefaultLink, ...] = (GROUND_STATION,)
     """Links that ``volery vehicle serve`` opens unless addresses are given."""
     versions: Mapping[str, Mapping[str, Firmware]] = field(default_factory=dict)
@@ -231,7 +231,7 @@ class Autopilot:
             raise UsageError(f"{firmware.name} is for a {firmware.kind}, but the body is a {kind}")
         self.firmware = firmware
         self.name = name or f"{firmware.name}_{system}"
-        self.vehicle = Vehicle(
+        self.vehicle = AutopilotVehicle(
             kernel, flight, firmware.rules, system=system, name=self.name, overrides=parameters
         )
         self.transmitter: MutableSequence[int] = self.vehicle.rc.transmitter

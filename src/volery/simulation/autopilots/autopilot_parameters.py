@@ -1,7 +1,7 @@
 """Parameters of a simulated autopilot, and the figures that manoeuvres fly by.
 
 Values are stored as the wire carries them: a ``float`` rounded to the parameter's own type (an integer type
-rounds, a real type is single precision). Each firmware derives its ``Tuning`` from its parameters.
+rounds, a real type is single precision). Each firmware derives its ``ManoeuvreTuning`` from its parameters.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def single(value: float) -> float:
     return rounded
 
 
-class Parameter(NamedTuple):
+class StoredParameter(NamedTuple):
     """One parameter: ``type`` is a MAV_PARAM_TYPE, ``value`` a number of that type."""
 
     name: str
@@ -67,17 +67,17 @@ def quantised(kind: int, value: float) -> float:
     return float(min(high, max(low, round(value))))
 
 
-def load(package: str, resource: str) -> tuple[Parameter, ...]:
+def load(package: str, resource: str) -> tuple[StoredParameter, ...]:
     """Read a packaged list: ``name type value [listed_by]`` per line, ``#`` starts a comment."""
     found = []
     for line in files(package).joinpath(resource).read_text(encoding="ascii").splitlines():
         if line and not line.startswith("#"):
             name, kind, value, *listed_by = line.split()
-            found.append(Parameter(name, int(kind), quantised(int(kind), float(value)), *listed_by))
+            found.append(StoredParameter(name, int(kind), quantised(int(kind), float(value)), *listed_by))
     return tuple(found)
 
 
-class Parameters:
+class VehicleParameters:
     """Parameters of one vehicle in the order of their indices.
 
     Those of a subsystem that is switched off are read and set by name, but have no index: length, iteration
@@ -101,7 +101,7 @@ class Parameters:
 
     def __init__(
         self,
-        defaults: Iterable[Parameter],
+        defaults: Iterable[StoredParameter],
         overrides: Mapping[str, float] | None = None,
         renamed: Mapping[str, Renamed] = NOT_RENAMED,
         *,
@@ -154,13 +154,15 @@ class Parameters:
         """Return whether a change of the parameter of that name changes what the vehicle does."""
         return name in self._effective
 
-    def _shown(self, parameter: Parameter) -> Parameter:
+    def _shown(self, parameter: StoredParameter) -> StoredParameter:
         """Return a parameter of the firmware's own table as it is shown."""
         one = self._renamed.get(parameter.name)
         if one is None:
             return parameter
         kind = parameter.type if one.type is None else one.type
-        return Parameter(one.name, kind, quantised(kind, one.shown(parameter.value)), parameter.listed_by)
+        return StoredParameter(
+            one.name, kind, quantised(kind, one.shown(parameter.value)), parameter.listed_by
+        )
 
     def name(self, own: str) -> str:
         """Return the name that is shown of a parameter of the firmware's own table."""
@@ -180,13 +182,13 @@ class Parameters:
     def __contains__(self, name: str) -> bool:
         return name in self._values
 
-    def __iter__(self) -> Iterator[Parameter]:
+    def __iter__(self) -> Iterator[StoredParameter]:
         return (self.at(index) for index in range(len(self._listed)))
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
 
-    def at(self, index: int) -> Parameter:
+    def at(self, index: int) -> StoredParameter:
         """Return the parameter with that index."""
         return self._now(self._listed[index])
 
@@ -194,11 +196,11 @@ class Parameters:
         """Return the index of a parameter that is listed."""
         return self._places[name]
 
-    def find(self, name: str) -> Parameter | None:
+    def find(self, name: str) -> StoredParameter | None:
         """Return the parameter of that name, listed or not, or ``None``."""
         return self._now(name) if name in self._index else None
 
-    def _now(self, name: str) -> Parameter:
+    def _now(self, name: str) -> StoredParameter:
         parameter = self._order[self._index[name]]
         value = self._shown_values[name] if name in self._own else self._values[name]
         return parameter if parameter.value == value else parameter._replace(value=value)
@@ -208,7 +210,7 @@ class Parameters:
         for one in self._order:
             self.set(one.name, one.value)
 
-    def set(self, name: str, value: float) -> Parameter | None:
+    def set(self, name: str, value: float) -> StoredParameter | None:
         """Set a parameter and return it, rounded to its type.
 
         Returns:
@@ -230,7 +232,7 @@ class Parameters:
 
 
 @dataclass(frozen=True)
-class Tuning:
+class ManoeuvreTuning:
     """Limits and gains of manoeuvres: speeds m/s, accelerations m/s^2, angles rad, lengths m, times ns."""
 
     sticks: StickMap = field(default_factory=StickMap)

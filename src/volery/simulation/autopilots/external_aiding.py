@@ -16,7 +16,7 @@ from volery.base.time import MS, Ns, to_seconds
 from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.flight_stack.flight_state import FUSE, REFUSE, RESET
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 HORIZON: Ns = 250 * MS
 """Age up to which a pose is compared with the estimate of its time; an older one counts as of that age."""
@@ -27,7 +27,7 @@ DIAGONAL = (0, 6, 11, 15, 18, 20)
 LOCAL_FRD, BODY_FRD = constant("MAV_FRAME_LOCAL_FRD"), constant("MAV_FRAME_BODY_FRD")
 
 
-class Pose(NamedTuple):
+class AidingPose(NamedTuple):
     """An external pose.
 
     Args:
@@ -45,7 +45,7 @@ class Pose(NamedTuple):
     resets: int
 
 
-def pose_of(name: str, fields: dict[str, Any]) -> Pose | None:
+def pose_of(name: str, fields: dict[str, Any]) -> AidingPose | None:
     """Return the pose in a VISION_POSITION_ESTIMATE or ODOMETRY; ``None``: it is not taken."""
     if name == "ODOMETRY":
         if (fields["frame_id"], fields["child_frame_id"]) != (LOCAL_FRD, BODY_FRD):
@@ -60,7 +60,7 @@ def pose_of(name: str, fields: dict[str, Any]) -> Pose | None:
         return None
     stated = isfinite(covariance[0])
     variances = tuple(covariance[place] if stated else 0.0 for place in DIAGONAL)
-    return Pose(stamp, position, yaw, variances, fields["reset_counter"])
+    return AidingPose(stamp, position, yaw, variances, fields["reset_counter"])
 
 
 class Fusion(NamedTuple):
@@ -114,19 +114,19 @@ class ExternalAiding:
     _jumps: int | None = None
     _past: deque[tuple[Ns, Vector, float]] = field(default_factory=deque)
 
-    def age(self, vehicle: Vehicle, pose: Pose) -> Ns:
+    def age(self, vehicle: AutopilotVehicle, pose: AidingPose) -> Ns:
         """Return the age of a pose by its stamp: how much later it came than the quickest one."""
         difference = vehicle.kernel.now() - pose.stamp * 1000
         self.lag = difference if self.lag is None else min(self.lag, difference)
         return difference - self.lag
 
-    def note_received(self, vehicle: Vehicle) -> None:
+    def note_received(self, vehicle: AutopilotVehicle) -> None:
         """Note that a pose has come."""
         now = vehicle.kernel.now()
         self.interval = now - self.received_at if self.received_at != NEVER else HORIZON
         self.received_at = now
 
-    def remember(self, vehicle: Vehicle) -> None:
+    def remember(self, vehicle: AutopilotVehicle) -> None:
         """Keep the estimate for poses that come later."""
         now, estimate = vehicle.kernel.now(), vehicle.estimate
         error = vehicle.flight.estimate_error
@@ -148,7 +148,7 @@ class ExternalAiding:
             later = earlier
         return later[1], later[2]
 
-    def fuse(self, vehicle: Vehicle, pose: Pose, age: Ns, fusion: Fusion) -> bool:
+    def fuse(self, vehicle: AutopilotVehicle, pose: AidingPose, age: Ns, fusion: Fusion) -> bool:
         """Fuse a pose, refuse it, or reset the estimate to it; return whether it was used.
 
         Args:
@@ -185,7 +185,7 @@ class ExternalAiding:
             self._past.clear()
         return True
 
-    def _is_far(self, vehicle: Vehicle, north: float, east: float, fusion: Fusion) -> bool:
+    def _is_far(self, vehicle: AutopilotVehicle, north: float, east: float, fusion: Fusion) -> bool:
         """Return whether a pose is beyond the gate."""
         passed = to_seconds(vehicle.kernel.now() - self.passed_at)
         drifted, tilted = fusion.drift[0] * passed, 0.5 * fusion.drift[1] * passed * passed
@@ -198,7 +198,7 @@ class ExternalAiding:
         return max(abs(north), abs(east)) > reach
 
 
-def place_origin(vehicle: Vehicle, aiding: ExternalAiding, fields: dict[str, Any]) -> bool:
+def place_origin(vehicle: AutopilotVehicle, aiding: ExternalAiding, fields: dict[str, Any]) -> bool:
     """Set the estimator's origin by SET_GPS_GLOBAL_ORIGIN, if it has none; return whether it was set."""
     latitude, longitude = fields["latitude"] / 1e7, fields["longitude"] / 1e7
     if fields["target_system"] not in (0, vehicle.system) or aiding.origin:

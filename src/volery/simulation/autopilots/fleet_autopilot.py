@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 from volery.base.installed import Registry
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Codec, Link
+from volery.links.link import Link, WireFormat
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.trace.events import VehicleState
@@ -79,7 +79,7 @@ class AutopilotFamily(Protocol):
         """Name of the entry point."""
 
     @property
-    def codec(self) -> Codec | None:
+    def codec(self) -> WireFormat | None:
         """Codec of their links; ``None``: they are reached over a ROS graph."""
 
     @property

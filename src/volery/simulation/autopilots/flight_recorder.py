@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from volery.base.time import US
 from volery.simulation.autopilots.onboard_log import SAMPLE, FlightLog
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 EACH = 2
 """One tick of the autopilot in so many is recorded."""
@@ -23,7 +23,7 @@ class FlightRecorder:
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self._open: FlightLog | None = None
         self._ticks = 0

@@ -58,7 +58,7 @@ class ChannelRange(NamedTuple):
         return int(self.low + (self.high - self.low) * along)
 
 
-class RcChannels:
+class ReceivedChannels:
     """RC channels as the autopilot reads them.
 
     Args:
@@ -146,7 +146,7 @@ class StickMap:
     ) * 4
     """Ranges of roll, pitch, throttle, yaw."""
 
-    def read(self, sticks: RcChannels) -> StickPositions:
+    def read(self, sticks: ReceivedChannels) -> StickPositions:
         """Return the stick positions."""
         roll, pitch, throttle, yaw = self.travels
         return StickPositions(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from volery.base.frames import Vector
 from volery.base.time import US, Ns
-from volery.simulation.autopilots.autopilot_parameters import Parameter
+from volery.simulation.autopilots.autopilot_parameters import StoredParameter
 
 
 class LogSample(NamedTuple):
@@ -68,7 +68,7 @@ class FlightLog:
     flies: bool
     origin: Vector
     home_down: float
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[StoredParameter, ...]
     values: bytearray = field(default_factory=bytearray)
     """Samples, each a ``SAMPLE``."""
     extras: list[tuple[LogRow, ...]] = field(default_factory=list)

@@ -1,9 +1,9 @@
 """Modes, manoeuvres and the state of one simulated vehicle as its autopilot software keeps it.
 
 The three stand in one module because they need one another: a mode creates its manoeuvre, a manoeuvre reads
-and drives its vehicle, a vehicle runs its manoeuvre. All parts of an autopilot share the ``Vehicle``. It
-sends through a ``VehicleOutput`` and knows no protocol; what differs between firmwares it reads from its
-``VehicleRules``.
+and drives its vehicle, a vehicle runs its manoeuvre. All parts of an autopilot share the
+``AutopilotVehicle``. It sends through a ``VehicleOutput`` and knows no protocol; what differs between
+firmwares it reads from its ``VehicleRules``.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
 from volery.simulation.autopilots.autopilot_parameters import (
     NOT_RENAMED,
-    Parameter,
-    Parameters,
+    ManoeuvreTuning,
     Renamed,
-    Tuning,
+    StoredParameter,
+    VehicleParameters,
 )
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
-from volery.simulation.autopilots.manual_control import RcChannels
+from volery.simulation.autopilots.manual_control import ReceivedChannels
 from volery.simulation.autopilots.onboard_log import FlightLog, LogRow
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, MissionItem, OnboardMission
 from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
@@ -40,7 +40,7 @@ from volery.simulation.autopilots.state_groups import (
 )
 
 
-class Manoeuvre:
+class FlightManoeuvre:
     """One way of flying or driving.
 
     ``enter`` is called once, then ``step`` at every tick and when the RC channels move. While the vehicle
@@ -51,7 +51,7 @@ class Manoeuvre:
         vehicle: The vehicle that is flown.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self.vehicle = vehicle
         self.landing = False
         """Whether it descends to land."""
@@ -67,7 +67,7 @@ class Manoeuvre:
         """Its destination, north, east, down about the estimator's origin [m]; ``None``: it has none."""
 
     @property
-    def flown(self) -> Manoeuvre:
+    def flown(self) -> FlightManoeuvre:
         """The manoeuvre that gives the set-points: this one, or the part of it that is flown now."""
         return self
 
@@ -131,7 +131,7 @@ class Mode:
     number: int
     name: str
     base_mode: int
-    manoeuvre: Callable[[Vehicle], Manoeuvre]
+    manoeuvre: Callable[[AutopilotVehicle], FlightManoeuvre]
     controls: int = 0
     needs_position: bool = False
     armable: bool = True
@@ -141,26 +141,26 @@ class Mode:
     starts_high: bool = False
 
 
-def do_nothing(_vehicle: Vehicle) -> None:
+def do_nothing(_vehicle: AutopilotVehicle) -> None:
     """Do nothing: the default of a firmware's actions."""
 
 
-def unlimited(_vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def unlimited(_vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return *setpoint*: the default of a firmware without avoidance."""
     return setpoint
 
 
-def height_above_home(vehicle: Vehicle) -> float:
+def height_above_home(vehicle: AutopilotVehicle) -> float:
     """Return the height above home: the default of a firmware without a range finder."""
     return vehicle.height
 
 
-def senses_ground(vehicle: Vehicle) -> bool:
+def senses_ground(vehicle: AutopilotVehicle) -> bool:
     """Return what the flight stack's landed detector reports: the default of a firmware."""
     return vehicle.estimate.landed
 
 
-def no_rows(_vehicle: Vehicle) -> tuple[LogRow, ...]:
+def no_rows(_vehicle: AutopilotVehicle) -> tuple[LogRow, ...]:
     """Return no rows: the default of a firmware that logs nothing of its own."""
     return ()
 
@@ -203,8 +203,8 @@ class ArmingTimes(NamedTuple):
 class ParameterTable(NamedTuple):
     """The parameters of a firmware and what follows from them."""
 
-    defaults: Callable[[], tuple[Parameter, ...]]
-    tuning: Callable[[Parameters], Tuning]
+    defaults: Callable[[], tuple[StoredParameter, ...]]
+    tuning: Callable[[VehicleParameters], ManoeuvreTuning]
     """Derive the limits and gains of the manoeuvres from parameter values."""
     of_vehicle: Callable[[int, Flight], Mapping[str, float]]
     """Return the values that follow from the system id and the body."""
@@ -235,25 +235,25 @@ class VehicleRules:
     arming: ArmingTimes = field(default_factory=ArmingTimes)
     parameters: ParameterTable
     rc: RcDefaults
-    senses_ground: Callable[[Vehicle], bool] = senses_ground
+    senses_ground: Callable[[AutopilotVehicle], bool] = senses_ground
     """Return whether the landed detector of a vehicle in flight reports the ground."""
     position_kept: float = 10.0
     """Time for which a position counts after the receiver has lost its fix [s]."""
     pose_kept: float = 7.0
     """Time for which it counts after the last external pose [s]; by default posRetryTimeNoVel_ms of EKF3."""
-    return_point: Callable[[Vehicle], Vector | None] = do_nothing
+    return_point: Callable[[AutopilotVehicle], Vector | None] = do_nothing
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
-    height_above_ground: Callable[[Vehicle], float] = height_above_home
+    height_above_ground: Callable[[AutopilotVehicle], float] = height_above_home
     """Return the height that a landing goes by [m]."""
-    limit: Callable[[Vehicle, Setpoint], Setpoint] = unlimited
+    limit: Callable[[AutopilotVehicle, Setpoint], Setpoint] = unlimited
     """Return the set-point that a manoeuvre may give, as avoidance limits it."""
-    log_extras: Callable[[Vehicle], tuple[LogRow, ...]] = no_rows
+    log_extras: Callable[[AutopilotVehicle], tuple[LogRow, ...]] = no_rows
     """Return what the log on board records beside the samples of every firmware."""
-    firmware_state: Callable[[Vehicle], object] = do_nothing
-    """Create the state that only this firmware keeps about a vehicle: ``Vehicle.firmware_state``."""
+    firmware_state: Callable[[AutopilotVehicle], object] = do_nothing
+    """Create the state that only this firmware keeps about a vehicle: ``AutopilotVehicle.firmware_state``."""
 
 
-class Vehicle:
+class AutopilotVehicle:
     """State of one simulated vehicle as its autopilot software keeps it, shared by all its parts.
 
     The state is grouped by owner: ``arming``, ``ground``, ``commanded``, ``failsafes``, ``reports``, ``rc``,
@@ -289,7 +289,7 @@ class Vehicle:
         """Restart the autopilot."""
         table = rules.parameters
         try:
-            self.parameters = Parameters(
+            self.parameters = VehicleParameters(
                 table.defaults(),
                 overrides,
                 table.renamed,
@@ -299,9 +299,9 @@ class Vehicle:
             )
         except UsageError as error:
             raise UsageError(f"{name}: {error}") from None
-        self.tuning = Tuning()
+        self.tuning = ManoeuvreTuning()
         self._tune()
-        self.rc = RcChannels(rules.rc.transmitter)
+        self.rc = ReceivedChannels(rules.rc.transmitter)
         self.mission = OnboardMission()
         self.points: dict[int, list[MissionItem]] = {}
         """Points of the fence and rally points, by MAV_MISSION_TYPE; they persist like the mission."""
@@ -315,7 +315,7 @@ class Vehicle:
         self.mode: Mode = rules.boot_mode
         self.mode_before: Mode = rules.boot_mode
         """The mode that was left last."""
-        self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
+        self.manoeuvre: FlightManoeuvre = self.mode.manoeuvre(self)
         self._reset()
 
     def _reset(self) -> None:
@@ -548,5 +548,5 @@ class Vehicle:
             )
 
 
-VehicleAction = Callable[[Vehicle], None]
+VehicleAction = Callable[[AutopilotVehicle], None]
 """An action of a firmware on its vehicle."""

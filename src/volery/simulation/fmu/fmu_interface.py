@@ -162,7 +162,7 @@ class _Finder:
             variables = self._variables_of(quantity, names, width)
             if variables:
                 widths[quantity] = width
-                references.extend(one.valueReference for one in variables)
+                references.extend(variable.valueReference for variable in variables)
         self._found |= widths.keys()
         return Exchanged(widths, tuple(references))
 
@@ -178,14 +178,18 @@ class _Finder:
                 f"has no variable for {', '.join(missing)}; name it below `variables`: {has}"
             )
         if self._problems:
-            raise UsageError("; ".join(f"{self._fmu.file} {one}" for one in self._problems))
+            raise UsageError("; ".join(f"{self._fmu.file} {problem}" for problem in self._problems))
 
     def parameters(self) -> Iterator[tuple[str, int, float | bool]]:
         """Yield type, value reference and value of each parameter that the model sets."""
         for name, value in self._fmu.parameters.items():
             variable = self._variables.get(name)
             if variable is None or variable.causality not in ("parameter", "structuralParameter"):
-                there = [one.name for one in self._variables.values() if one.causality == "parameter"]
+                there = [
+                    variable.name
+                    for variable in self._variables.values()
+                    if variable.causality == "parameter"
+                ]
                 raise UsageError(f"{self._fmu.file} has no parameter {name!r}{did_you_mean(name, there)}")
             made = _SETTABLE.get(variable.type)
             if made is None or made(value) != value:
@@ -195,7 +199,7 @@ class _Finder:
             yield variable.type, variable.valueReference, made(value)
 
     def _names(self, causality: str) -> str:
-        names = [one.name for one in self._variables.values() if one.causality == causality]
+        names = [variable.name for variable in self._variables.values() if variable.causality == causality]
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
         return (", ".join(names[:_SHOWN]) or "none") + more
 
@@ -231,6 +235,6 @@ class _Finder:
             if (one.causality == "input") != (quantity in INPUTS):
                 end = "input" if quantity in INPUTS else "output"
                 return f"has {one.name} as {one.causality}; {quantity} is an {end}"
-        if sum(prod(one.shape or ()) for one in variables) != width:
+        if sum(prod(variable.shape or ()) for variable in variables) != width:
             return f"gives {quantity} another number of values than {width}"
         return ""

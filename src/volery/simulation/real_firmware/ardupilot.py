@@ -20,8 +20,8 @@ from volery.simulation.autopilots.ardupilot.copter import MODES as COPTER_MODES
 from volery.simulation.autopilots.ardupilot.rover import MODES as ROVER_MODES
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.real_firmware.exchange import ANSWER_LIMIT_S, pose_after
-from volery.simulation.real_firmware.firmware_instance import Assignment, Instance
-from volery.simulation.real_firmware.firmware_process import FirmwareProcess, Port
+from volery.simulation.real_firmware.firmware_instance import Assignment, FirmwareInstance
+from volery.simulation.real_firmware.firmware_process import FirmwareProcess, LoopbackPort
 from volery.simulation.real_firmware.ground_link import UdpConnection
 from volery.simulation.world.body_specs import FRAMES, BodySpec, Multirotor
 from volery.simulation.world.state_layout import (
@@ -34,15 +34,15 @@ from volery.simulation.world.state_layout import (
     U_GPS_OFFSET,
 )
 
-JSON_PORT = Port("udp", 9002, 10)
+JSON_PORT = LoopbackPort("udp", 9002, 10)
 """Where the firmware sends its questions."""
-GROUND_PORT = Port("udp", 5766, 10)
+GROUND_PORT = LoopbackPort("udp", 5766, 10)
 """Where the firmware sends what it says on its first serial port.
 
 Over TCP what it says would wait for acknowledgements, whose time is that of the wall clock.
 """
-_TRANSMITTER_PORT = Port("udp", 5501, 10)
-LISTENS = (Port("tcp", 5762, 10), Port("tcp", 5763, 10), _TRANSMITTER_PORT)
+_TRANSMITTER_PORT = LoopbackPort("udp", 5501, 10)
+LISTENS = (LoopbackPort("tcp", 5762, 10), LoopbackPort("tcp", 5763, 10), _TRANSMITTER_PORT)
 """What the firmware opens beside: its other serial ports, and the receiver of a transmitter."""
 LOOP_RATE = "SCHED_LOOP_RATE"
 _USUAL_LOOP_RATE_HZ = {"multirotor": 400.0, "rover": 50.0}
@@ -304,7 +304,7 @@ def home_option(flight: Flight) -> str:
     return f"--home={latitude:.9f},{longitude:.9f},{amsl:.4f},{flight.spec.heading_deg:.4f}"
 
 
-def start(asked: Assignment) -> Instance:
+def start(asked: Assignment) -> FirmwareInstance:
     """Start an ArduCopter or an ArduRover.
 
     Raises:
@@ -338,7 +338,7 @@ def start(asked: Assignment) -> Instance:
     period = exchange_period(kind, parameters)
     exchange = ArduPilotExchange(process, (north, east, -up), commands_of(flight.spec), period)
     connection = UdpConnection(process.sockets[1])
-    return Instance(
+    return FirmwareInstance(
         process,
         exchange,
         connection,

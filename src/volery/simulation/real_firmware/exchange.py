@@ -18,7 +18,7 @@ ANSWER_LIMIT_S = 10.0
 """Time of the wall clock after which a firmware that does not answer hangs."""
 
 
-class Pose(NamedTuple):
+class TrueMotion(NamedTuple):
     """True motion of a body.
 
     Args:
@@ -37,7 +37,7 @@ def vector(row: Sequence[float], column: int) -> Vector:
     return row[column], row[column + 1], row[column + 2]
 
 
-def pose_after(row: Sequence[float], ahead: float) -> Pose:
+def pose_after(row: Sequence[float], ahead: float) -> TrueMotion:
     """Return the motion in *row*, *ahead* seconds later: a firmware's step is no multiple of the world's.
 
     Args:
@@ -53,10 +53,10 @@ def pose_after(row: Sequence[float], ahead: float) -> Pose:
         forward, left, above = vector(row, S_RATES)
         turn = 1.0, half * forward, half * left, half * above
         attitude = multiply(attitude, turn)  # its length is off by 1e-6 at most
-    return Pose(enu_to_ned((east, north, up)), enu_to_ned(velocity), attitude_enu_to_ned(attitude))
+    return TrueMotion(enu_to_ned((east, north, up)), enu_to_ned(velocity), attitude_enu_to_ned(attitude))
 
 
-class Exchange(Protocol):
+class SimulationPort(Protocol):
     """The simulation port of one firmware."""
 
     @property

@@ -9,16 +9,19 @@ from pathlib import Path
 from volery.base.errors import UsageError, choices
 from volery.base.seeds import stream
 from volery.kernel.api import Kernel
-from volery.links.link import Codec
+from volery.links.link import WireFormat
 from volery.links.mavlink_codec import MAVLINK
 from volery.simulation.autopilots.autopilot import GROUND_STATION
 from volery.simulation.autopilots.fleet_autopilot import DefaultLink
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.real_firmware import ardupilot, px4
-from volery.simulation.real_firmware.firmware_instance import Assignment, Instance
+from volery.simulation.real_firmware.firmware_instance import Assignment, FirmwareInstance
 from volery.simulation.real_firmware.lock_step import RealFirmware
 
-PROJECTS: Mapping[str, Callable[[Assignment], Instance]] = {"ardupilot": ardupilot.start, "px4": px4.start}
+PROJECTS: Mapping[str, Callable[[Assignment], FirmwareInstance]] = {
+    "ardupilot": ardupilot.start,
+    "px4": px4.start,
+}
 """How an instance of each project is started."""
 
 
@@ -39,7 +42,7 @@ class RealFirmwareFamily:
     folder: Path
     repeatable: bool = False
     seed: int = 0
-    codec: Codec | None = MAVLINK
+    codec: WireFormat | None = MAVLINK
     default_links: tuple[DefaultLink, ...] = (GROUND_STATION,)
     airframes: bool = True
 

@@ -49,7 +49,7 @@ class LinkFrom(NamedTuple):
     minor: int
 
 
-class Setting(NamedTuple):
+class FaultParameter(NamedTuple):
     """A parameter of a firmware, and its value while a fault is present."""
 
     name: str
@@ -66,10 +66,10 @@ class ByParameters(NamedTuple):
     """
 
     column: int
-    settings: tuple[tuple[Setting, ...], ...]
+    settings: tuple[tuple[FaultParameter, ...], ...]
     unit: float = 0.0
 
-    def value(self, setting: Setting, row: Sequence[float]) -> float:
+    def value(self, setting: FaultParameter, row: Sequence[float]) -> float:
         """Return the value of a setting for the fault that is in a state row."""
         return setting.value * round(row[self.column] / self.unit) if self.unit else setting.value
 
@@ -105,24 +105,25 @@ WAYS: Mapping[str, Mapping[str, Way | LinkFrom | ByParameters]] = {
         "battery-low": _BATTERY_OF_THE_WORLD,
         "battery-cell-dead": _BATTERY_OF_THE_WORLD,
         "gps-lost": ByParameters(
-            U_GPS_BLOCKED, ((Setting("SIM_GPS1_ENABLE", 0.0), Setting("SIM_GPS_DISABLE", 1.0)),)
+            U_GPS_BLOCKED, ((FaultParameter("SIM_GPS1_ENABLE", 0.0), FaultParameter("SIM_GPS_DISABLE", 1.0)),)
         ),
         "gps-drift": Way.LINK,
         "barometer-stuck": ByParameters(
-            U_BARO_BLOCKED, ((Setting("SIM_BARO_FREEZE", 1.0),), (Setting("SIM_BAR2_FREEZE", 1.0),))
+            U_BARO_BLOCKED,
+            ((FaultParameter("SIM_BARO_FREEZE", 1.0),), (FaultParameter("SIM_BAR2_FREEZE", 1.0),)),
         ),
         "compass-stuck": ByParameters(
             U_MAG_BLOCKED,
-            tuple((Setting(f"SIM_MAG{number}_FAIL", _FROZEN_COMPASS),) for number in (1, 2, 3)),
+            tuple((FaultParameter(f"SIM_MAG{number}_FAIL", _FROZEN_COMPASS),) for number in (1, 2, 3)),
         ),
         "compass-turned": ByParameters(
             U_MAG_TURN,
-            tuple((Setting(f"SIM_MAG{number}_ORIENT", 1.0),) for number in (1, 2, 3)),
+            tuple((FaultParameter(f"SIM_MAG{number}_ORIENT", 1.0),) for number in (1, 2, 3)),
             _ORIENTATION,
         ),
         "imu-biased": Way.LINK,
         "imu-noisy": Way.LINK,
-        "rc-lost": ByParameters(U_RC_BLOCKED, ((Setting("SIM_RC_FAIL", 1.0),),)),
+        "rc-lost": ByParameters(U_RC_BLOCKED, ((FaultParameter("SIM_RC_FAIL", 1.0),),)),
     },
     "px4": {
         **_IN_THE_WORLD,
@@ -158,10 +159,10 @@ _VERSION = "AUTOPILOT_VERSION"
 _TAKEN_UP_WITHIN: Ns = 2 * S
 
 
-class _Change(NamedTuple):
+class _PendingParameter(NamedTuple):
     """A parameter that was set, and must be taken up."""
 
-    setting: Setting
+    setting: FaultParameter
     at: Ns
 
 
@@ -191,8 +192,10 @@ class FirmwareFaults:
         self._asked: dict[str, tuple[int, Ns]] = {}  # how often and when last, by what was asked for
         self._ask_at: Ns = 0
         self._wanted: dict[str, str] = {}  # kind by name of the fault
-        self._before: dict[str, list[Setting]] = {}  # by kind of a present fault, what is to be restored
-        self._changes: list[_Change] = []
+        self._before: dict[
+            str, list[FaultParameter]
+        ] = {}  # by kind of a present fault, what is to be restored
+        self._changes: list[_PendingParameter] = []
         self.settled = not self._by_version and not stated and not any(self._unknown())
         """Whether it is known which parameters and which version the firmware has."""
 
@@ -300,22 +303,24 @@ class FirmwareFaults:
         if self._counts:
             self._count(row, now)
 
-    def _begin(self, kind: str, way: ByParameters, row: Sequence[float]) -> list[Setting]:
+    def _begin(self, kind: str, way: ByParameters, row: Sequence[float]) -> list[FaultParameter]:
         owned = [[setting for setting in group if setting.name in self._known] for group in way.settings]
-        settings = [Setting(group[0].name, way.value(group[0], row)) for group in owned if group]
-        self._before[kind] = [Setting(name, self._known[name]) for name, _ in settings]
+        settings = [FaultParameter(group[0].name, way.value(group[0], row)) for group in owned if group]
+        self._before[kind] = [FaultParameter(name, self._known[name]) for name, _ in settings]
         return settings
 
-    def _set(self, settings: Sequence[Setting], now: Ns) -> None:
+    def _set(self, settings: Sequence[FaultParameter], now: Ns) -> None:
         names = {setting.name for setting in settings}
         self._changes = [change for change in self._changes if change.setting.name not in names]
         for setting in settings:
             self._ground.set_parameter(*setting)
-            self._changes.append(_Change(setting, now))
+            self._changes.append(_PendingParameter(setting, now))
 
     def _check(self, now: Ns) -> None:
         """Drop the changes that were taken up."""
-        self._changes = [one for one in self._changes if self._known[one.setting.name] != one.setting.value]
+        self._changes = [
+            change for change in self._changes if self._known[change.setting.name] != change.setting.value
+        ]
         for (name, value), at in self._changes:
             if now - at > _TAKEN_UP_WITHIN:
                 raise CapabilityError(

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.real_firmware.exchange import Exchange
+from volery.simulation.real_firmware.exchange import SimulationPort
 from volery.simulation.real_firmware.firmware_process import FirmwareProcess
-from volery.simulation.real_firmware.ground_link import Connection
+from volery.simulation.real_firmware.ground_link import TelemetryPort
 
 
 class Assignment(NamedTuple):
@@ -34,7 +34,7 @@ class Assignment(NamedTuple):
     repeatable: bool
 
 
-class Instance(NamedTuple):
+class FirmwareInstance(NamedTuple):
     """An instance that runs.
 
     Args:
@@ -48,8 +48,8 @@ class Instance(NamedTuple):
     """
 
     process: FirmwareProcess
-    exchange: Exchange
-    connection: Connection
+    exchange: SimulationPort
+    connection: TelemetryPort
     mode_name: Callable[[int], str]
     kinds: tuple[int, ...]
     arms_lost: bool = False

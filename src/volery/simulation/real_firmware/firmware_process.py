@@ -48,7 +48,7 @@ def lacks(whose: str, parameters: Set[str]) -> FirmwareError:
     return FirmwareError(f"{whose} has no parameter {names}; leave it out, or name it as this version does")
 
 
-class Port(NamedTuple):
+class LoopbackPort(NamedTuple):
     """A port of loopback: of instance i it is *number* + i *stride*."""
 
     kind: str
@@ -86,9 +86,9 @@ class FirmwareProcess:
         command: Sequence[str],
         folder: Path,
         *,
-        sockets: Sequence[Port] = (),
+        sockets: Sequence[LoopbackPort] = (),
         inherited: Sequence[int] = (),
-        listens: Sequence[Port] = (),
+        listens: Sequence[LoopbackPort] = (),
         environment: Mapping[str, str] | None = None,
         lock: str = "",
         core: int | None = None,

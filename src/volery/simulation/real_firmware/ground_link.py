@@ -101,7 +101,7 @@ def _version(number: int, commit: Sequence[int]) -> str:
     return f"{major}.{minor}.{patch}{release}" + (f" ({written[:8]})" if text else "")
 
 
-class Connection(Protocol):
+class TelemetryPort(Protocol):
     """Bytes to and from the telemetry port of a firmware; no method waits."""
 
     def read(self) -> bytes:
@@ -127,7 +127,7 @@ class UdpConnection:
         bound.setblocking(False)
 
     def read(self) -> bytes:
-        """See ``Connection``."""
+        """See ``TelemetryPort``."""
         return b"".join(iter(self.datagram, b""))
 
     def datagram(self) -> bytes:
@@ -141,13 +141,13 @@ class UdpConnection:
         return octets
 
     def write(self, octets: bytes) -> None:
-        """See ``Connection``."""
+        """See ``TelemetryPort``."""
         if self._peer is not None:
             with suppress(OSError):  # no peer any more, which the next exchange finds
                 self._socket.sendto(octets, self._peer)
 
     def close(self) -> None:
-        """See ``Connection``; the process closes its sockets."""
+        """See ``TelemetryPort``; the process closes its sockets."""
 
 
 class GroundLink:
@@ -160,7 +160,7 @@ class GroundLink:
             instant of virtual time in each run.
     """
 
-    def __init__(self, connection: Connection, frame: LocalFrame, meet: Callable[[], None]) -> None:
+    def __init__(self, connection: TelemetryPort, frame: LocalFrame, meet: Callable[[], None]) -> None:
         self.reported = Reported(frame)
         self._connection, self._meet = connection, meet
         self._parser = MAVLINK.parser()

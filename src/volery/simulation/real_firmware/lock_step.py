@@ -20,7 +20,7 @@ from volery.links.mavlink_messages import message_type
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.real_firmware.firmware_faults import FirmwareFaults
-from volery.simulation.real_firmware.firmware_instance import Instance
+from volery.simulation.real_firmware.firmware_instance import FirmwareInstance
 from volery.simulation.real_firmware.ground_link import GroundLink
 from volery.simulation.world.state_layout import (
     M_ACCEL,
@@ -70,7 +70,13 @@ class RealFirmware:
     banner = b""
 
     def __init__(
-        self, kernel: Kernel, flight: Flight, instance: Instance, name: str, project: str, random: Random
+        self,
+        kernel: Kernel,
+        flight: Flight,
+        instance: FirmwareInstance,
+        name: str,
+        project: str,
+        random: Random,
     ) -> None:
         self.transmitter: MutableSequence[int] = [0] * 16
         self.next_step = 0

@@ -30,8 +30,8 @@ from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.px4.airframes import COPTER_MODES
 from volery.simulation.autopilots.px4.modes import main_and_sub
 from volery.simulation.real_firmware.exchange import ANSWER_LIMIT_S
-from volery.simulation.real_firmware.firmware_instance import Assignment, Instance
-from volery.simulation.real_firmware.firmware_process import FirmwareError, FirmwareProcess, Port
+from volery.simulation.real_firmware.firmware_instance import Assignment, FirmwareInstance
+from volery.simulation.real_firmware.firmware_process import FirmwareError, FirmwareProcess, LoopbackPort
 from volery.simulation.real_firmware.ground_link import STATION, UdpConnection
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.dynamics import CELL_FULL_VOLTS
@@ -57,11 +57,11 @@ from volery.simulation.world.state_layout import (
     U_MAG_BLOCKED,
 )
 
-SIMULATOR_PORT = Port("tcp", 4560, 1)
+SIMULATOR_PORT = LoopbackPort("tcp", 4560, 1)
 """Where this program waits for the firmware's simulator link, which connects."""
-GROUND_PORT = Port("udp", 14_540, 1)
+GROUND_PORT = LoopbackPort("udp", 14_540, 1)
 """Where the firmware sends its telemetry."""
-_FIRMWARE_GROUND_PORT = Port("udp", 14_580, 1)
+_FIRMWARE_GROUND_PORT = LoopbackPort("udp", 14_580, 1)
 """Where it receives commands."""
 _LOCK_FILE = "/tmp/px4_lock-{instance}"
 """What a PX4 locks: its tools find it by its instance number."""
@@ -428,11 +428,11 @@ class Px4Exchange:
                 controls = self._reader.feed(octets)
             except ValueError as error:
                 raise self._process.error(f"sends no MAVLink on its simulator link: {error}") from None
-            for one in controls:
-                if not one.lock_step:
+            for control in controls:
+                if not control.lock_step:
                     raise self._process.error("was built without lock step; build px4_sitl_default")
-                if one.time == self._sent:
-                    return one.values[: self._motors]
+                if control.time == self._sent:
+                    return control.values[: self._motors]
 
     def _write(self, octets: bytes) -> None:
         try:
@@ -582,7 +582,7 @@ def _mode_name(number: int) -> str:
     return mode.name if mode is not None else "MODE {}.{}".format(*main_and_sub(number))
 
 
-def start(asked: Assignment) -> Instance:
+def start(asked: Assignment) -> FirmwareInstance:
     """Start a PX4 for a multirotor.
 
     Raises:
@@ -620,4 +620,4 @@ def start(asked: Assignment) -> Instance:
     exchange = Px4Exchange(
         process, flight, ground, asked.system, asked.parameters.keys(), repeatable=asked.repeatable
     )
-    return Instance(process, exchange, ground, _mode_name, (_KINDS[len(spec.rotors)],))
+    return FirmwareInstance(process, exchange, ground, _mode_name, (_KINDS[len(spec.rotors)],))

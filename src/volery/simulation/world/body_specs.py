@@ -112,7 +112,7 @@ def _above_zero(noun: str, spec: object, names: tuple[str, ...]) -> None:
 
 
 @dataclass(frozen=True)
-class Battery:
+class BatteryPack:
     """A lithium-polymer pack.
 
     Args:
@@ -225,7 +225,7 @@ class Multirotor:
     heading_deg: float = 0.0
     sensors: str = "consumer"
     added_sensors: tuple[str | SampledSensor, ...] = ()
-    battery: Battery = Battery()
+    battery: BatteryPack = BatteryPack()
     mass: float = 3.0
     inertia: Vector = (0.040, 0.040, 0.089)
     rotors: tuple[Rotor, ...] = field(default_factory=lambda: x_frame(0.25))
@@ -255,7 +255,7 @@ class Multirotor:
     @property
     def reach(self) -> float:
         """Distance of the rotors' tips from the centre [m]."""
-        arm = max(sqrt(one.forward * one.forward + one.left * one.left) for one in self.rotors)
+        arm = max(sqrt(rotor.forward * rotor.forward + rotor.left * rotor.left) for rotor in self.rotors)
         return arm + 0.5 * self.propeller_diameter
 
     @property
@@ -293,9 +293,9 @@ class Multirotor:
     def authority(self) -> Vector:
         """Angular acceleration for a difference of full thrust between motors, about forward, left, up."""
         full = self.thrust_coefficient * self.top_speed * self.top_speed
-        reach = max(max(abs(one.forward), abs(one.left)) for one in self.rotors)
-        roll = sum(one.left * one.left for one in self.rotors) / reach
-        pitch = sum(one.forward * one.forward for one in self.rotors) / reach
+        reach = max(max(abs(rotor.forward), abs(rotor.left)) for rotor in self.rotors)
+        roll = sum(rotor.left * rotor.left for rotor in self.rotors) / reach
+        pitch = sum(rotor.forward * rotor.forward for rotor in self.rotors) / reach
         yaw = len(self.rotors) * self.torque_coefficient / self.thrust_coefficient
         return (
             full * roll / self.inertia[0], full * pitch / self.inertia[1], full * yaw / self.inertia[2]
@@ -329,7 +329,7 @@ class Multirotor:
 
 
 @dataclass(frozen=True)
-class Rover:
+class WheeledRover:
     """A rover that steers like a car, or is skid-steered.
 
     Args:
@@ -358,7 +358,7 @@ class Rover:
     heading_deg: float = 0.0
     sensors: str = "consumer"
     added_sensors: tuple[str | SampledSensor, ...] = ()
-    battery: Battery = Battery(capacity_ah=10.0)
+    battery: BatteryPack = BatteryPack(capacity_ah=10.0)
     mass: float = 8.0
     wheelbase: float = 0.4
     steer_top_deg: float = 30.0
@@ -383,7 +383,7 @@ class Rover:
         return 0.75 * self.wheelbase
 
 
-BodySpec = Multirotor | Rover
+BodySpec = Multirotor | WheeledRover
 
 
 def _decay_in_half_a_step(lag: float) -> float:
@@ -415,7 +415,7 @@ def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     row[P_INFLOW] = weight / (jet * jet)
 
 
-def _fill_rover(row: Array, spec: Rover) -> None:
+def _fill_rover(row: Array, spec: WheeledRover) -> None:
     row[P_KIND] = ROVER
     row[P_WHEELBASE] = spec.wheelbase
     row[P_MAX_STEERING] = radians(spec.steer_top_deg)

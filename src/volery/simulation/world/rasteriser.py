@@ -132,7 +132,7 @@ class Exposure:
         return time, min(needed / time, self.most_gain)
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """Where a camera is and how it moves.
 
     Args:
@@ -176,7 +176,9 @@ class Rasteriser:
         self._step = np.zeros(1, dtype=np.int64)
         triangles = _triangles(solids)
         buffer = (2 * reach[1] + 1, 2 * reach[0] + 1)
-        cells = np.concatenate([one.cells.reshape(-1) for one in markers] or [np.zeros(0, dtype=np.uint8)])
+        cells = np.concatenate(
+            [marker.cells.reshape(-1) for marker in markers] or [np.zeros(0, dtype=np.uint8)]
+        )
         self._picture = np.zeros((lens.height, lens.width), dtype=np.uint8)
         self._draw = draw_picture.bind(
             triangles, _rows(markers), np.ascontiguousarray(cells, dtype=np.uint8), _texture(), lines,
@@ -188,7 +190,7 @@ class Rasteriser:
         )  # fmt: skip
         self._noisy = noise is not None
 
-    def draw(self, view: View, ground: float, lux: float = DAY_LUX, k: int = 0) -> Picture:
+    def draw(self, view: CameraView, ground: float, lux: float = DAY_LUX, k: int = 0) -> Picture:
         """Return a new picture (height, width).
 
         Args:

@@ -163,7 +163,7 @@ class Barometer(ErrorModel):
 
 
 @dataclass(frozen=True)
-class RangeFinder(ErrorModel):
+class DownwardRange(ErrorModel):
     """Downward range finder [m], sampled at 20 Hz.
 
     Only the white part of its error is simulated.
@@ -219,7 +219,7 @@ class SensorSuite:
     magnetometer: ErrorModel = Magnetometer()
     barometer: ErrorModel = Barometer()
     gps: GpsReceiver = GpsReceiver()
-    range_finder: RangeFinder = RangeFinder()
+    range_finder: DownwardRange = DownwardRange()
     perfect: bool = False
 
 
@@ -252,7 +252,7 @@ SENSOR_SUITES: dict[str, SensorSuite] = {
         magnetometer=ErrorModel(),
         barometer=ErrorModel(),
         gps=GpsReceiver(ErrorModel(), ErrorModel(), ErrorModel(), rate=10.0, fix_type=RTK_FIX),
-        range_finder=RangeFinder(0.0, 0.0, 1.0),
+        range_finder=DownwardRange(0.0, 0.0, 1.0),
         perfect=True,
     ),
 }
@@ -319,7 +319,7 @@ class Mounting(NamedTuple):
     turn: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
-class Publication(NamedTuple):
+class SensorMessage(NamedTuple):
     """What is published of each sample.
 
     Args:
@@ -397,9 +397,9 @@ class SampledSensor(ABC):
         """Write a reading into a new message of ``type``. Its header is there already."""
         raise NotImplementedError(f"sensor {self.name}: a sensor with a type of messages fills them")
 
-    def publications(self) -> tuple[Publication, ...]:
+    def publications(self) -> tuple[SensorMessage, ...]:
         """Return what is published of each sample."""
-        return (Publication(self.topic or self.name, self.type, self.fill),) if self.type else ()
+        return (SensorMessage(self.topic or self.name, self.type, self.fill),) if self.type else ()
 
 
 @dataclass(frozen=True)

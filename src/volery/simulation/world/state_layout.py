@@ -6,7 +6,7 @@ constants, which numba compiles into the code as literals. Structured arrays are
 rejected: the integrator treats the first columns as one vector, for which records need overlapping fields.
 
 Prefixes: ``S_`` state, ``U_`` inputs, ``M_`` measurements, ``P_`` parameters, ``W_`` scratch. The flight
-stack continues the layout with ``Layout(after=WORLD_LAYOUT)``. SI units.
+stack continues the layout with ``ColumnLayout(after=WORLD_LAYOUT)``. SI units.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ OCTETS = 8
 """Size of a value in a row."""
 
 
-class Field(NamedTuple):
+class StateField(NamedTuple):
     """One declared field: it takes *width* columns from *column* on."""
 
     name: str
@@ -35,17 +35,17 @@ class Field(NamedTuple):
     meaning: str
 
 
-class Layout:
+class ColumnLayout:
     """Allots consecutive columns to fields in the order of their declaration.
 
     Args:
         after: The layout that this one continues; ``None``: columns start at 0.
     """
 
-    def __init__(self, after: Layout | None = None) -> None:
+    def __init__(self, after: ColumnLayout | None = None) -> None:
         self.start: int = after.end if after else 0
         self.end: int = self.start
-        self.fields: list[Field] = []
+        self.fields: list[StateField] = []
 
     def add(self, name: str, unit: str, meaning: str, width: int = 1, axes: str = "") -> int:
         """Declare a field and return its first column.
@@ -57,7 +57,7 @@ class Layout:
             width: Number of columns, at least 1.
             axes: What the columns stand for, in order, where there are several.
         """
-        field = Field(name, self.end, width, unit, axes, meaning)
+        field = StateField(name, self.end, width, unit, axes, meaning)
         self.fields.append(field)
         self.end += width
         return field.column
@@ -71,7 +71,7 @@ ROTORS = 8
 """The most rotors of a body; those that it lacks stand still."""
 MOTORS = "motor 0 to motor 7"
 
-WORLD_LAYOUT = Layout()
+WORLD_LAYOUT = ColumnLayout()
 _add = WORLD_LAYOUT.add
 
 # --- state that a step advances ---

@@ -117,7 +117,7 @@ class Truth(NamedTuple):
     distance: float
 
 
-class Collision(NamedTuple):
+class BodyImpact(NamedTuple):
     """How a body hit something that stands in the world.
 
     Args:
@@ -245,7 +245,8 @@ class World:
             body: {
                 sensor.name: MountedSensor(sensor, seed, body, self.scene)
                 for sensor in (
-                    added_sensor(one) if isinstance(one, str) else one for one in spec.added_sensors
+                    added_sensor(sensor) if isinstance(sensor, str) else sensor
+                    for sensor in spec.added_sensors
                 )
             }
             for body, spec in enumerate(self.specs)
@@ -335,7 +336,7 @@ class World:
             row[S_DISTANCE],
         )
 
-    def last_collision(self, body: int) -> Collision | None:
+    def last_collision(self, body: int) -> BodyImpact | None:
         """Return the last collision of *body* so far; ``None``: it has hit nothing."""
         self.advance_to_now(body)
         row = self.arrays.rows[body, : S_COLLISION + 6].tolist()
@@ -343,7 +344,7 @@ class World:
             return None
         step, solid, speed, east, north, up = row[S_COLLISION:]
         name = self.scene.solids[int(solid)].name
-        return Collision(int(step) * STEP, name, speed, (east, north, up), int(row[S_COLLISIONS]))
+        return BodyImpact(int(step) * STEP, name, speed, (east, north, up), int(row[S_COLLISIONS]))
 
     def measurement(self, body: int, sensor: str) -> Measurement:
         """Return the last sample of an added sensor of *body*.

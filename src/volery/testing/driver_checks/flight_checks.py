@@ -8,7 +8,7 @@ from volery.base.errors import Refused, UsageError, VehicleError
 from volery.base.position import Position
 from volery.base.time import to_seconds
 from volery.testing.checks import check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 
 UP = (Capability.TAKEOFF,)
@@ -22,7 +22,7 @@ STANDING_M_S = 0.7
 HOME_NEAR_M = 3.0
 
 
-def demand_there(stage: Stage, goal: Position, across: float = NEAR_M, up: float = NEAR_UP_M) -> None:
+def demand_there(stage: TestStage, goal: Position, across: float = NEAR_M, up: float = NEAR_UP_M) -> None:
     """Demand that the vehicle is at `goal` by its own estimate."""
     north, east, _ = stage.offset(goal, stage.drone.position)
     high = stage.drone.altitude.metres - _above_home(stage, goal)
@@ -30,14 +30,14 @@ def demand_there(stage: Stage, goal: Position, across: float = NEAR_M, up: float
     demand(off <= across and abs(high) <= up, f"{off:.1f} m beside and {high:+.1f} m above {goal}")
 
 
-def _above_home(stage: Stage, goal: Position) -> float:
+def _above_home(stage: TestStage, goal: Position) -> float:
     metres: float = goal.altitude.metres
     if type(goal.altitude).__name__ == "AMSL":
         metres -= stage.drone.home.altitude.metres
     return metres
 
 
-def demand_standing(stage: Stage) -> None:
+def demand_standing(stage: TestStage) -> None:
     """Demand that the vehicle does not move by its own estimate."""
     velocity = stage.drone.velocity
     speed = hypot(*velocity)
@@ -45,7 +45,7 @@ def demand_standing(stage: Stage) -> None:
 
 
 @check(needs=UP, flies=True)
-def takeoff(stage: Stage) -> None:
+def takeoff(stage: TestStage) -> None:
     """Check that a take-off to 10 m of a disarmed vehicle ends 10 m above home, at most 1.5 m short."""
     stage.drone.takeoff(10)
     height = stage.drone.altitude.metres
@@ -54,7 +54,7 @@ def takeoff(stage: Stage) -> None:
 
 
 @check(needs=UP, flies=True)
-def takeoff_in_the_air(stage: Stage) -> None:
+def takeoff_in_the_air(stage: TestStage) -> None:
     """Check that a take-off of a flying vehicle is refused and the vehicle flies on."""
     stage.drone.takeoff(10)
     with raising(Refused, naming=stage.name):
@@ -63,7 +63,7 @@ def takeoff_in_the_air(stage: Stage) -> None:
 
 
 @check(needs=GO, flies=True)
-def goto(stage: Stage) -> None:
+def goto(stage: TestStage) -> None:
     """Check that a goto returns at the goal by the autopilot's estimate, at rest, and stays there."""
     stage.drone.takeoff(10)
     goal = stage.at(30, 20, 12)
@@ -75,7 +75,7 @@ def goto(stage: Stage) -> None:
 
 
 @check(needs=GO, flies=True)
-def altitude_frames(stage: Stage) -> None:
+def altitude_frames(stage: TestStage) -> None:
     """Check that the same height above home and AMSL is the same height."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(15, 0, 14))
@@ -89,7 +89,7 @@ def altitude_frames(stage: Stage) -> None:
 
 
 @check(needs=(*GO, Capability.SPEED), flies=True)
-def speed(stage: Stage) -> str:
+def speed(stage: TestStage) -> str:
     """Check that goto(goal, speed=3) flies at 3 m/s over ground, at most a quarter faster."""
     stage.drone.takeoff(10)
     seen, fastest = stage.drone.telemetry, [0.0]
@@ -105,7 +105,7 @@ def speed(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def goto_again(stage: Stage) -> None:
+def goto_again(stage: TestStage) -> None:
     """Check that a goto() to the current position is no error and returns at once."""
     stage.drone.takeoff(10)
     goal = stage.at(20, 0)
@@ -117,7 +117,7 @@ def goto_again(stage: Stage) -> None:
 
 
 @check(needs=(*UP, Capability.HOLD, Capability.VELOCITY), flies=True)
-def hold(stage: Stage) -> str:
+def hold(stage: TestStage) -> str:
     """Check that a hold at 4 m/s returns at rest, and stays there."""
     stage.drone.takeoff(10)
     stage.drone.set_velocity(north=4.0, lasting=20.0)
@@ -132,7 +132,7 @@ def hold(stage: Stage) -> str:
 
 
 @check(needs=(*UP, Capability.VELOCITY), flies=True)
-def velocity(stage: Stage) -> str:
+def velocity(stage: TestStage) -> str:
     """Check that set_velocity() returns in motion, flies for the given time, then stops."""
     stage.drone.takeoff(10)
     start = stage.drone.position
@@ -148,7 +148,7 @@ def velocity(stage: Stage) -> str:
 
 
 @check(needs=(*UP, Capability.VELOCITY), flies=True)
-def climbing(stage: Stage) -> None:
+def climbing(stage: TestStage) -> None:
     """Check that set_velocity(up=1) climbs: up is positive."""
     stage.drone.takeoff(10)
     before = stage.drone.altitude.metres
@@ -159,7 +159,7 @@ def climbing(stage: Stage) -> None:
 
 
 @check(needs=(*UP, Capability.HEADING), flies=True)
-def heading(stage: Stage) -> None:
+def heading(stage: TestStage) -> None:
     """Check that set_heading() turns clockwise from north, by the smaller angle, and stays in place."""
     stage.drone.takeoff(10)
     here = stage.drone.position
@@ -172,7 +172,7 @@ def heading(stage: Stage) -> None:
 
 
 @check(needs=(*GO, Capability.RETURN_HOME), flies=True)
-def return_home(stage: Stage) -> str:
+def return_home(stage: TestStage) -> str:
     """Check that the vehicle returns home, lands near it and is disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(25, -10))
@@ -182,7 +182,7 @@ def return_home(stage: Stage) -> str:
 
 
 @check(needs=(*GO, Capability.LAND), flies=True)
-def land(stage: Stage) -> str:
+def land(stage: TestStage) -> str:
     """Check that the vehicle lands at its current position and is disarmed."""
     stage.drone.takeoff(10)
     stage.drone.goto(stage.at(10, 10))
@@ -191,7 +191,7 @@ def land(stage: Stage) -> str:
     return _demand_down(stage, here)
 
 
-def _demand_down(stage: Stage, place: Position) -> str:
+def _demand_down(stage: TestStage, place: Position) -> str:
     stage.until(lambda: stage.drone.landed, 3.0, "it is in the air")
     demand(not stage.drone.armed, "it is armed")
     north, east, _ = stage.offset(place, stage.drone.position)
@@ -201,7 +201,7 @@ def _demand_down(stage: Stage, place: Position) -> str:
 
 
 @check(needs=(*GO, Capability.LAND, Capability.RETURN_HOME), flies=True)
-def home_change(stage: Stage) -> str:
+def home_change(stage: TestStage) -> str:
     """Check that after a landing elsewhere and a new take-off, heights and return_home() use one home."""
     stage.drone.takeoff(10)
     first = stage.drone.home
@@ -220,7 +220,7 @@ def home_change(stage: Stage) -> str:
 
 
 @check(needs=UP, flies=True)
-def disarming_in_the_air(stage: Stage) -> str:
+def disarming_in_the_air(stage: TestStage) -> str:
     """Check that disarm() without force of a flying vehicle is refused and the vehicle flies on."""
     stage.drone.takeoff(10)
     with raising(Refused, naming=stage.name) as caught:
@@ -230,7 +230,7 @@ def disarming_in_the_air(stage: Stage) -> str:
 
 
 @check(needs=UP, flies=True)
-def two_flows_of_control(stage: Stage) -> None:
+def two_flows_of_control(stage: TestStage) -> None:
     """Check that of two tasks that command one vehicle the second gets an error, the first continues."""
     stage.drone.wait_ready()  # first: until it is ready the other one could not even begin
     stage.later(1.0, lambda: stage.drone.takeoff(10))
@@ -242,7 +242,7 @@ def two_flows_of_control(stage: Stage) -> None:
 
 
 @check(needs=(*GO, Capability.LAND), flies=True)
-def safety_comes_first(stage: Stage) -> str:
+def safety_comes_first(stage: TestStage) -> str:
     """Check that land() of another task aborts goto() with an error, and succeeds itself."""
     stage.drone.takeoff(10)
     stage.later(3.0, stage.drone.land)
@@ -253,7 +253,7 @@ def safety_comes_first(stage: Stage) -> str:
 
 
 @check(needs=UP, flies=True)
-def the_end_of_a_program(stage: Stage) -> str:
+def the_end_of_a_program(stage: TestStage) -> str:
     """Check that come_to_rest() of a flying vehicle lands it and reports so."""
     stage.drone.takeoff(10)
     words = str(stage.drone.come_to_rest())

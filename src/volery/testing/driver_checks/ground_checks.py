@@ -9,7 +9,7 @@ from volery.base.errors import CapabilityError, NotArrived, Refused, UsageError,
 from volery.base.position import AboveGround, Ellipsoidal, Position
 from volery.base.time import to_seconds
 from volery.testing.checks import CheckFailedError, NotPossibleError, check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 
 SAYS_WITHIN_S = 15.0
@@ -17,7 +17,7 @@ READY_FOR_S, READY_AGAIN_WITHIN_S = 5.0, 15.0
 
 
 @check(kind="")
-def identification(stage: Stage) -> str:
+def identification(stage: TestStage) -> str:
     """Check that a connected vehicle reports its kind, autopilot and mode."""
     seen = stage.drone.telemetry
     stage.until(
@@ -28,7 +28,7 @@ def identification(stage: Stage) -> str:
 
 
 @check(kind="")
-def capabilities(stage: Stage) -> str:
+def capabilities(stage: TestStage) -> str:
     """Check that capabilities are known before arming, and requests of missing ones change nothing."""
     can = stage.drone.capabilities
     demand(can, "it states no capabilities")
@@ -43,7 +43,7 @@ def capabilities(stage: Stage) -> str:
     return "all" if not missing else "all but to " + ", ".join(one.value for one in missing)
 
 
-def _asking(stage: Stage) -> dict[Capability, Callable[[], None]]:
+def _asking(stage: TestStage) -> dict[Capability, Callable[[], None]]:
     drone = stage.drone
     if drone.kind != "drone":
         return {}
@@ -59,7 +59,7 @@ def _asking(stage: Stage) -> dict[Capability, Callable[[], None]]:
 
 
 @check(kind="")
-def readiness(stage: Stage) -> str:
+def readiness(stage: TestStage) -> str:
     """Check that wait_ready() returns when the vehicle can arm and navigate, and that this lasts.
 
     A second call states what would refuse a take-off.
@@ -76,7 +76,7 @@ def readiness(stage: Stage) -> str:
 
 
 @check(kind="", cold=True)
-def readiness_after_switching_on(stage: Stage) -> str:
+def readiness_after_switching_on(stage: TestStage) -> str:
     """Check that wait_ready() of a vehicle just switched on does not return before it has a position."""
     began = stage.kernel.now()
     stage.drone.wait_ready()
@@ -85,7 +85,7 @@ def readiness_after_switching_on(stage: Stage) -> str:
 
 
 @check(kind="", cold=True)
-def readiness_in_time(stage: Stage) -> None:
+def readiness_in_time(stage: TestStage) -> None:
     """Check that wait_ready(within=2) of a vehicle just switched on raises NotArrived after 2 s."""
     began = stage.kernel.now()
     with raising(NotArrived, naming=stage.name):
@@ -94,7 +94,7 @@ def readiness_in_time(stage: Stage) -> None:
 
 
 @check(kind="", flies=True, cold=True)
-def arming_refused(stage: Stage) -> str:
+def arming_refused(stage: TestStage) -> str:
     """Check that arming too early is refused with the autopilot's text.
 
     A driver that provides by itself what is missing returns armed instead.
@@ -112,7 +112,7 @@ def arming_refused(stage: Stage) -> str:
 
 
 @check(kind="", flies=True)
-def arming(stage: Stage) -> None:
+def arming(stage: TestStage) -> None:
     """Check that arm() returns armed, disarm() disarmed, and that repeating them is no error."""
     stage.drone.wait_ready()
     stage.drone.hold()  # a rover that is armed in a pilot's mode is the pilot's
@@ -125,7 +125,7 @@ def arming(stage: Stage) -> None:
 
 
 @check(needs=(Capability.GOTO,))
-def goto_on_the_ground(stage: Stage) -> None:
+def goto_on_the_ground(stage: TestStage) -> None:
     """Check that goto() before a take-off is refused and nothing moves."""
     stage.drone.wait_ready()
     with raising(Refused, naming=stage.name):
@@ -134,7 +134,7 @@ def goto_on_the_ground(stage: Stage) -> None:
 
 
 @check()
-def land_on_the_ground(stage: Stage) -> None:
+def land_on_the_ground(stage: TestStage) -> None:
     """Check that land() of a disarmed vehicle on the ground returns at once."""
     stage.drone.wait_ready()
     began = stage.kernel.now()
@@ -144,7 +144,7 @@ def land_on_the_ground(stage: Stage) -> None:
 
 
 @check()
-def numbers_that_are_none(stage: Stage) -> None:
+def numbers_that_are_none(stage: TestStage) -> None:
     """Check that arguments which are not finite or out of range are refused before anything is sent."""
     stage.drone.wait_ready()
     drone, refused = stage.drone, (UsageError, CapabilityError, VehicleError)
@@ -163,7 +163,7 @@ def numbers_that_are_none(stage: Stage) -> None:
 
 
 @check(needs=(Capability.TAKEOFF,))
-def too_high(stage: Stage) -> None:
+def too_high(stage: TestStage) -> None:
     """Check that a take-off above the given limits is refused before the vehicle is armed."""
     stage.drone.wait_ready()
     with raising(VehicleError, naming=stage.name):
@@ -172,7 +172,7 @@ def too_high(stage: Stage) -> None:
 
 
 @check(flies=True, needs=(Capability.TAKEOFF, Capability.GOTO))
-def altitudes_that_it_cannot_fly(stage: Stage) -> str:
+def altitudes_that_it_cannot_fly(stage: TestStage) -> str:
     """Check that an ellipsoidal altitude is a CapabilityError; one above ground is, too, or is flown to."""
     stage.drone.takeoff(10)
     home = stage.drone.home
@@ -188,7 +188,7 @@ def altitudes_that_it_cannot_fly(stage: Stage) -> str:
 
 
 @check(kind="")
-def what_if_silent(stage: Stage) -> str:
+def what_if_silent(stage: TestStage) -> str:
     """Check that a connected driver states in one line the vehicle's reaction to the loss of its link."""
     stage.until(stage.driver.on_link_loss, SAYS_WITHIN_S, "it never says")
     words = stage.driver.on_link_loss()
@@ -197,7 +197,7 @@ def what_if_silent(stage: Stage) -> str:
 
 
 @check(kind="")
-def battery(stage: Stage) -> str:
+def battery(stage: TestStage) -> str:
     """Check that battery figures are plausible: a share from 0 to 1, volts above 0, or not measured."""
     stage.sleep(3.0)
     found = stage.drone.battery

@@ -7,7 +7,7 @@ from math import hypot
 from volery.base.errors import LinkLost, VehicleError, VoleryError
 from volery.base.time import to_seconds
 from volery.testing.checks import check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 from volery.vehicles.executor import LINK_TIMEOUT
 
@@ -16,7 +16,7 @@ NOTICED_S = to_seconds(LINK_TIMEOUT) + 1.5
 
 
 @check(needs=GO, flies=True)
-def link_cut_for_a_moment(stage: Stage) -> str:
+def link_cut_for_a_moment(stage: TestStage) -> str:
     """Check that an interruption of the link for 0.5 s in flight has no effect."""
     stage.drone.takeoff(10)
     stage.later(2.0, stage.link_control.drop)
@@ -26,7 +26,7 @@ def link_cut_for_a_moment(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def link_cut_for_two_seconds(stage: Stage) -> str:
+def link_cut_for_two_seconds(stage: TestStage) -> str:
     """Check that goto() survives an interruption of the link for 2 s.
 
     It arrives, or reports that the autopilot has taken over; it neither reports a lost link nor hangs.
@@ -43,7 +43,7 @@ def link_cut_for_two_seconds(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def link_lost(stage: Stage) -> str:
+def link_lost(stage: TestStage) -> str:
     """Check that an interruption of the link for 10 s ends goto() with LinkLost, 5 s after the last message.
 
     When the link is back, the vehicle can be landed, or is left to the commander that controls it.
@@ -66,7 +66,7 @@ def link_lost(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def lost_commands(stage: Stage) -> str:
+def lost_commands(stage: TestStage) -> str:
     """Check that goto() ends with an error within its time while only the vehicle's frames arrive."""
     stage.drone.takeoff(10)
     stage.link_control.sends = False
@@ -81,7 +81,7 @@ def lost_commands(stage: Stage) -> str:
 
 
 @check(needs=(Capability.TAKEOFF,), flies=True)
-def commander_silence(stage: Stage) -> str:
+def commander_silence(stage: TestStage) -> str:
     """Check that a vehicle whose program dies in flight neither falls nor flies away within 20 s.
 
     A program that starts then lands the vehicle, or leaves it to the commander that controls it.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from volery.base.errors import Refused, UsageError, VehicleError
 from volery.testing.checks import check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 
 STICKS = (Capability.MANUAL_CONTROL, Capability.ALTITUDE_HOLD)
@@ -19,7 +19,7 @@ STRAYED_M = 4.0
 
 
 def fly_by_hand(
-    stage: Stage,
+    stage: TestStage,
     seconds: float,
     throttle: float,
     *,
@@ -36,7 +36,7 @@ def fly_by_hand(
 
 
 @check(needs=STICKS)
-def sticks_out_of_range(stage: Stage) -> None:
+def sticks_out_of_range(stage: TestStage) -> None:
     """Check that controls beyond -1..1 and a throttle beyond 0..1 are refused by name."""
     for sticks, which in (((2, 0, 0.5, 0), "pitch"), ((0, -2, 0.5, 0), "roll"), ((0, 0, 1.1, 0), "throttle")):
         with raising(UsageError, naming=which):
@@ -44,7 +44,7 @@ def sticks_out_of_range(stage: Stage) -> None:
 
 
 @check(needs=(*STICKS, *UP), flies=True)
-def stale_controls(stage: Stage) -> None:
+def stale_controls(stage: TestStage) -> None:
     """Check that altitude_hold() in flight is refused while no control sample is newer than 1 s."""
     stage.drone.takeoff(10)
     with raising(Refused, UsageError, VehicleError, naming=stage.name):
@@ -54,7 +54,7 @@ def stale_controls(stage: Stage) -> None:
 
 
 @check(needs=(*STICKS, *UP), flies=True)
-def altitude_hold(stage: Stage) -> str:
+def altitude_hold(stage: TestStage) -> str:
     """Check that in altitude hold a throttle of 0.5 keeps the height."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0, 0, 0.5, 0)
@@ -68,7 +68,7 @@ def altitude_hold(stage: Stage) -> str:
 
 
 @check(needs=(*CLIMBING, *UP), flies=True)
-def climb_by_throttle(stage: Stage) -> str:
+def climb_by_throttle(stage: TestStage) -> str:
     """Check that in altitude hold a throttle of 0.8 climbs and 0.2 descends."""
     stage.drone.takeoff(10)
     stage.drone.manual_control(0, 0, 0.5, 0)
@@ -85,7 +85,7 @@ def climb_by_throttle(stage: Stage) -> str:
 
 
 @check(needs=(*STICKS, *UP), flies=True)
-def pitching_forward(stage: Stage) -> None:
+def pitching_forward(stage: TestStage) -> None:
     """Check that pitch +0.3 flies forward and roll +0.3 to the right."""
     stage.drone.takeoff(10)
     if Capability.HEADING in stage.drone.capabilities:
@@ -104,7 +104,7 @@ def pitching_forward(stage: Stage) -> None:
 
 
 @check(needs=(*STABILIZED, *UP), flies=True)
-def stabilize(stage: Stage) -> str:
+def stabilize(stage: TestStage) -> str:
     """Check that stabilize mode is entered and flown manually, and that goto() regains control."""
     stage.drone.takeoff(20)
     stage.drone.manual_control(0, 0, 0.5, 0)
@@ -119,7 +119,7 @@ def stabilize(stage: Stage) -> str:
 
 
 @check(needs=(*STICKS, *UP, Capability.GOTO), flies=True)
-def with_and_without_a_position(stage: Stage) -> None:
+def with_and_without_a_position(stage: TestStage) -> None:
     """Check that control changes in flight from positions to manual and back."""
     stage.drone.takeoff(10)
     for north in (15, 0):
@@ -130,18 +130,18 @@ def with_and_without_a_position(stage: Stage) -> None:
 
 
 @check(needs=(*CLIMBING, Capability.LAND), flies=True)
-def altitude_hold_without_satellites(stage: Stage) -> str:
+def altitude_hold_without_satellites(stage: TestStage) -> str:
     """Check that without satellites altitude_hold() arms; the vehicle climbs manually and land() lands it."""
     return _without_satellites(stage, stage.drone.altitude_hold)
 
 
 @check(needs=(*STABILIZED, Capability.LAND), flies=True)
-def stabilize_without_satellites(stage: Stage) -> str:
+def stabilize_without_satellites(stage: TestStage) -> str:
     """Check that without satellites stabilize() arms; the vehicle climbs manually and land() lands it."""
     return _without_satellites(stage, stage.drone.stabilize)
 
 
-def _without_satellites(stage: Stage, mode: Callable[[], None]) -> str:
+def _without_satellites(stage: TestStage, mode: Callable[[], None]) -> str:
     stage.drone.wait_ready()
     stage.flight.block_gps()
     stage.sleep(30)
@@ -160,7 +160,7 @@ def _without_satellites(stage: Stage, mode: Callable[[], None]) -> str:
 
 
 @check(needs=(*STICKS, *UP, Capability.GOTO), flies=True)
-def satellites_lost_in_flight(stage: Stage) -> str:
+def satellites_lost_in_flight(stage: TestStage) -> str:
     """Check that without satellites in flight goto() ends with a VehicleError or arrives late.
 
     Manual control and land() still work.

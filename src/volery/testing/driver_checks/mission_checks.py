@@ -6,14 +6,14 @@ from volery.base.errors import OutOfBounds, UsageError
 from volery.base.time import S
 from volery.testing.checks import check, demand, raising
 from volery.testing.driver_checks.flight_checks import demand_there
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability, ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 
 MISSION = (Capability.MISSION,)
 
 
 @check(needs=MISSION, flies=True)
-def mission(stage: Stage) -> None:
+def mission(stage: TestStage) -> None:
     """Check that a mission is uploaded, started, flown and landed; start_mission() returns disarmed."""
     stage.drone.wait_ready()
     goal = stage.at(25, 10, 12)
@@ -42,7 +42,7 @@ def mission(stage: Stage) -> None:
 
 
 @check(needs=MISSION, flies=True)
-def mission_that_returns(stage: Stage) -> None:
+def mission_that_returns(stage: TestStage) -> None:
     """Check that a mission that ends with a return home ends there, disarmed."""
     stage.drone.wait_ready()
     stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(25, 0)), ReturnHome()])
@@ -61,7 +61,7 @@ def mission_that_returns(stage: Stage) -> None:
 
 
 @check(needs=(*MISSION, Capability.GOTO), flies=True)
-def mission_that_ends_in_the_air(stage: Stage) -> None:
+def mission_that_ends_in_the_air(stage: TestStage) -> None:
     """Check that goto() and land() work after a mission whose last item is a waypoint."""
     stage.drone.wait_ready()
     last = stage.at(15, 5)
@@ -75,7 +75,7 @@ def mission_that_ends_in_the_air(stage: Stage) -> None:
 
 
 @check(needs=MISSION)
-def missions_that_make_no_sense(stage: Stage) -> None:
+def missions_that_make_no_sense(stage: TestStage) -> None:
     """Check that an empty mission and one outside the limits are refused before anything is sent."""
     stage.drone.wait_ready()
     with raising(UsageError, naming=stage.name):

@@ -15,14 +15,14 @@ from volery.base.errors import (
 )
 from volery.base.time import S
 from volery.testing.checks import NotPossibleError, check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 
 GO = (Capability.TAKEOFF, Capability.GOTO)
 
 
 @check(needs=(*GO, Capability.LAND), flies=True)
-def mode_change_by_another(stage: Stage) -> str:
+def mode_change_by_another(stage: TestStage) -> str:
     """Check that goto() ends with Overridden when another station lands it, which is not resisted."""
     other = stage.other()
     stage.drone.takeoff(10)
@@ -38,12 +38,12 @@ def mode_change_by_another(stage: Stage) -> str:
     return caught.text.removeprefix(f"{stage.name}: ")
 
 
-def _slow(stage: Stage) -> float | None:
+def _slow(stage: TestStage) -> float | None:
     return 2.0 if Capability.SPEED in stage.drone.capabilities else None
 
 
 @check(needs=GO, flies=True)
-def sent_elsewhere_by_another(stage: Stage) -> str:
+def sent_elsewhere_by_another(stage: TestStage) -> str:
     """Check that goto() ends with an error when another station sends the vehicle elsewhere in the same mode.
 
     The error is Overridden if the autopilot reports its target, else NotArrived in time; the target is not
@@ -65,7 +65,7 @@ def sent_elsewhere_by_another(stage: Stage) -> str:
 
 
 @check(needs=(*GO, Capability.LAND), flies=True)
-def mode_change_while_idle(stage: Stage) -> None:
+def mode_change_while_idle(stage: TestStage) -> None:
     """Check that goto() after a landing by another station reports that and does not resist."""
     other = stage.other()
     stage.drone.takeoff(15)
@@ -77,7 +77,7 @@ def mode_change_while_idle(stage: Stage) -> None:
 
 
 @check(needs=(Capability.TAKEOFF, Capability.LAND), flies=True)
-def mode_change_during_takeoff(stage: Stage) -> str:
+def mode_change_during_takeoff(stage: TestStage) -> str:
     """Check that takeoff() ends with a VehicleError when another station lands the vehicle."""
     other = stage.other()
     stage.drone.wait_ready()
@@ -94,7 +94,7 @@ def mode_change_during_takeoff(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True, lets_fall=True)
-def disarmed_midway(stage: Stage) -> str:
+def disarmed_midway(stage: TestStage) -> str:
     """Check that goto() ends with Overridden when another station stops the motors, and is not resumed."""
     other = stage.other()
     stage.drone.takeoff(5)
@@ -120,7 +120,7 @@ def disarmed_midway(stage: Stage) -> str:
 
 
 @check(needs=(Capability.TAKEOFF,), flies=True)
-def disarmed_before_lift_off(stage: Stage) -> str:
+def disarmed_before_lift_off(stage: TestStage) -> str:
     """Check that a take-off disarmed by another station is repeated, or ends with an error that says so."""
     other = stage.other()
     stage.drone.wait_ready()
@@ -140,7 +140,7 @@ def disarmed_before_lift_off(stage: Stage) -> str:
 
 
 @check(needs=(Capability.TAKEOFF,), flies=True, neighbour=True)
-def another_vehicle_on_the_air(stage: Stage) -> None:
+def another_vehicle_on_the_air(stage: TestStage) -> None:
     """Check that only the addressed vehicle arms and flies when a second one is on the same link."""
     neighbour = stage.neighbour
     neighbour.wait_connected()
@@ -152,7 +152,7 @@ def another_vehicle_on_the_air(stage: Stage) -> None:
 
 
 @check(kind="")
-def wrong_system_id(stage: Stage) -> str:
+def wrong_system_id(stage: TestStage) -> str:
     """Check that a driver for a system id without a vehicle reports that no message arrives."""
     stranger = stage.of_system(77)
     try:
@@ -164,7 +164,7 @@ def wrong_system_id(stage: Stage) -> str:
 
 
 @check(needs=GO, flies=True)
-def home_moved_by_another(stage: Stage) -> str:
+def home_moved_by_another(stage: TestStage) -> str:
     """Check that a home set by another station 20 m away is reported, and return_home() goes there."""
     other = stage.other()
     stage.drone.takeoff(10)

@@ -6,14 +6,14 @@ from math import hypot
 
 from volery.base.errors import UsageError
 from volery.testing.checks import check, demand, raising
-from volery.testing.stage import Stage
+from volery.testing.stage import TestStage
 from volery.vehicles import Capability
 
 NEAR_M = 3.0
 
 
 @check(kind="rover", needs=(Capability.GOTO,), flies=True)
-def drive(stage: Stage) -> None:
+def drive(stage: TestStage) -> None:
     """Check that a rover is armed, drives and stops at the goal by the autopilot's estimate, at rest."""
     stage.drone.wait_ready()
     goal = stage.at(25, 10, 0.0)
@@ -25,7 +25,7 @@ def drive(stage: Stage) -> None:
 
 
 @check(kind="rover", needs=(Capability.GOTO, Capability.RETURN_HOME), flies=True)
-def drive_home(stage: Stage) -> None:
+def drive_home(stage: TestStage) -> None:
     """Check that return_home() stops near home."""
     stage.drone.wait_ready()
     stage.drone.drive(stage.at(25, 0, 0.0))
@@ -35,7 +35,7 @@ def drive_home(stage: Stage) -> None:
 
 
 @check(kind="rover", needs=(Capability.MANUAL_CONTROL,), flies=True)
-def drive_by_hand(stage: Stage) -> None:
+def drive_by_hand(stage: TestStage) -> None:
     """Check that in manual(), armed, the throttle drives, and a control out of range is refused."""
     stage.drone.wait_ready()
     stage.drone.manual_control(0.0, 0.0)
@@ -52,7 +52,7 @@ def drive_by_hand(stage: Stage) -> None:
 
 
 @check(kind="rover", needs=(Capability.GOTO,), flies=True)
-def rest(stage: Stage) -> str:
+def rest(stage: TestStage) -> str:
     """Check that come_to_rest() stops and disarms the rover."""
     stage.drone.wait_ready()
     stage.drone.drive(stage.at(10, 0, 0.0))

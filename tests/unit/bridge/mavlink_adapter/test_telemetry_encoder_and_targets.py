@@ -12,8 +12,8 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Position
 from volery.base.time import S
 from volery.bridge.mavlink_adapter.drone_commands import (
+    ChannelsOverride,
     PositionTarget,
-    RcChannels,
     VelocityTarget,
     global_target,
     local_target,
@@ -222,7 +222,7 @@ def channels(*pulses: int) -> dict[str, int]:
 
 
 def test_channels_as_sticks() -> None:
-    held = RcChannels()
+    held = ChannelsOverride()
     assert held.update(channels(1600, 1250, 1000, 1400)) == ManualControl(
         0.5, 0.2, 0.0, -0.2
     )  # low pitch: forward

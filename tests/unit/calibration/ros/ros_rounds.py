@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.base.seeds import stream
-from volery.calibration.ros.call_costs import FOLLOWING, Round, Sample
+from volery.calibration.ros.call_costs import FOLLOWING, ProbeSample, Round
 
 OWN, IDLE = 40_000.0, 0.001
 """ns that the probe's own looking takes; ns of the library's threads for each ns on the wall."""
@@ -35,13 +35,13 @@ class Probe:
         self._random = stream(seed, "probe")
         self._noise, self._spins, self._period_us = noise, spins, period_us
 
-    def _sample(self, what: str, x: float, cycles: int, each: float, waited: float = 1e8) -> Sample:
+    def _sample(self, what: str, x: float, cycles: int, each: float, waited: float = 1e8) -> ProbeSample:
         if cycles == CYCLES:
             waited = CYCLES * self._period_us * 1e3
         process = each * cycles * (1.0 + self._random.gauss(0.0, self._noise))
-        return Sample(what, x, cycles, round(waited), round(process), round(process / 2))
+        return ProbeSample(what, x, cycles, round(waited), round(process), round(process / 2))
 
-    def _once(self, what: str, cost: float, x: float = 0.0) -> Sample:
+    def _once(self, what: str, cost: float, x: float = 0.0) -> ProbeSample:
         return self._sample(what, x, 1, OWN + cost + IDLE * 1e8)
 
     def round(self, counts: tuple[int, ...] = (1, 2, 4, 8)) -> Round:

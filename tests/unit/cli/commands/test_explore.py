@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from rigs.small_campaigns import COUNT, StubEngine, model  # noqa: F401  # a fixture
 from volery.cli.main import application
-from volery.explore.points import Row
+from volery.explore.points import CampaignRow
 
 ENERGY = "drone_1.energy"
 ONE = ("--set", f"{COUNT}=1 .. 9")
@@ -51,7 +51,7 @@ def test_influences_are_shown_with_intervals(explore, monkeypatch):
     def submit(self, function, /, task, **options):
         future = Future()
         observables = {ENERGY: 10.0 * task.point.values[COUNT]}
-        future.set_result(Row(task.run, task.point, observables=observables))
+        future.set_result(CampaignRow(task.run, task.point, observables=observables))
         return future
 
     monkeypatch.setattr(StubEngine, "submit", submit)

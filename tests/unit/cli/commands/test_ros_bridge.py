@@ -5,7 +5,7 @@ from typer.testing import CliRunner
 
 from volery.cli.command import BAD_INPUT
 from volery.cli.commands.ros import BridgeNotes
-from volery.cli.console import Output
+from volery.cli.console import CommandOutput
 from volery.cli.main import application
 from volery.trace.events import LinkState, Text
 
@@ -52,7 +52,7 @@ def test_what_makes_no_sense(arguments: tuple[str, ...], says: str) -> None:
 
 
 def test_a_status_is_printed_when_it_changes(capsys: pytest.CaptureFixture[str]) -> None:
-    notes = BridgeNotes(Output())
+    notes = BridgeNotes(CommandOutput())
     for text in ("no autopilot", "no autopilot", "an autopilot"):
         notes.status(1_000_000_000, text)
     notes.record(LinkState(2_000_000_000, "tcp://x", "lost", "the other side closed the connection"))

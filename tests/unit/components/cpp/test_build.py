@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import ModelError, UsageError
 from volery.base.position import AboveHome, Position
 from volery.components.cpp import build, compiler
-from volery.components.cpp.build import RequiredPort, cpp_type, glue, interfaces_header, operation, operations
+from volery.components.cpp.build import CppPort, cpp_type, glue, interfaces_header, operation, operations
 from volery.components.cpp.framework import Crash, StepMeter, read_crash
 from volery.components.cpp.sources import executables, find_sources
 from volery.components.entry_points import find_executable
@@ -37,7 +37,7 @@ def test_an_interface_becomes_an_abstract_class():
 
 
 def test_the_glue_constructs_from_ports_and_serves_operations():
-    requires = [RequiredPort("routes", "Routing"), RequiredPort("drones", "Drone", many=True)]
+    requires = [CppPort("routes", "Routing"), CppPort("drones", "Drone", many=True)]
     text = glue("Planner", Path("/there/planner.cpp"), requires, operations(ROUTING), {"Routing": ROUTING})
     assert '#include "/there/planner.cpp"' in text
     assert "class Routing_port final : public Routing, public volery::Port {" in text

@@ -8,12 +8,12 @@ import pytest
 
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.components.instance import Allocation, Instance
+from volery.components.instance import Allocation, RunningInstance
 from volery.components.loader import Loader
 from volery.components.programs import load_program, start
 from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.virtual import VirtualKernel
-from volery.model.environment import Environment, Place, Prism, Ways, Workload
+from volery.model.environment import Environment, PlaceSpec, Prism, Ways, Workload
 from volery.trace.events import Milestone, Text
 
 COMPONENTS = Path(__file__).parents[4] / "examples" / "delivery" / "components"
@@ -22,7 +22,7 @@ FRAME = LocalFrame(43.46, -3.81, 20.0)
 
 def place(name, east, north, role=""):
     latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
-    return Place(name, latitude, longitude, FRAME.amsl, east, north, role)
+    return PlaceSpec(name, latitude, longitude, FRAME.amsl, east, north, role)
 
 
 PLACES = {
@@ -71,7 +71,7 @@ class Bench:
         self.failures = []
 
     def start(self, file, class_name, operations=(), active=True, **given):
-        instance = Instance(
+        instance = RunningInstance(
             self.kernel, class_name, Allocation(priority=0 if active else None), operations=operations
         )
         program = load_program(self.loader, class_name, COMPONENTS / file, class_name)

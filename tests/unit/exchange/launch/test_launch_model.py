@@ -8,12 +8,12 @@ import volery
 from rigs.launch_files import LaunchBench, lost
 from volery.base.errors import ModelError
 from volery.components.package_search import PackageSearch
-from volery.exchange.launch.launch_model import Computer, launch_tree, read_launch
+from volery.exchange.launch.launch_model import LaunchComputer, launch_tree, read_launch
 from volery.model.system_loader import load
 from volery.model.writing import model_text
 from volery.run.assembly.model_checks import vocabulary
 
-ONBOARD = Computer("rpi4-cortex-a72", 1.5e9)
+ONBOARD = LaunchComputer("rpi4-cortex-a72", 1.5e9)
 SAY = """
 import rospy
 from std_msgs.msg import String

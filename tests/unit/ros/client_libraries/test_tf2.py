@@ -19,7 +19,7 @@ from volery.ros.client_libraries.tf2.transform_tree import (
     RigidTransform,
     TransformTree,
 )
-from volery.ros.graph.unserved import Surroundings
+from volery.ros.graph.unserved import KnownParticipants
 from volery.trace.events import Text
 
 BROADCASTER = """
@@ -403,6 +403,6 @@ def test_a_transform_that_is_never_there_is_named_at_the_end(stage):
         """,
     )
     stage.run()
-    (one,) = stage.graph.unserved(Surroundings(["seeker"]))
+    (one,) = stage.graph.unserved(KnownParticipants(["seeker"]))
     assert (one.kind, one.name, one.times) == ("transform", "transform from base to map", 3)
     assert one.hint == "no node publishes /tf"

@@ -9,7 +9,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.graph import EmbeddedGraph, Node
 from volery.ros.graph.interface import BEST_EFFORT, RELIABLE, QoS
-from volery.ros.graph.unserved import Surroundings
+from volery.ros.graph.unserved import KnownParticipants
 from volery.ros.messages import new
 from volery.trace.events import Unserved
 
@@ -27,7 +27,7 @@ def found(
         theirs = graph.node("mavros", "/drone_1", context=ExecutionContext("drone_1/mavros"))
         kernel.sleep_until(2 * S)
         body(ours, theirs)
-        around = Surroundings(["flyer"], vehicles or {}, [without] if without else [])
+        around = KnownParticipants(["flyer"], vehicles or {}, [without] if without else [])
         seen = graph.unserved(around)
     graph.close()
     return {one.name: one for one in seen}

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 from volery.base.errors import UsageError
 from volery.ros.messages import cdr_size, define, from_cdr, message_class, new, to_cdr
 from volery.ros.messages.cdr_encoder import abridged, encode
-from volery.ros.messages.message import LONG, Field, Message
+from volery.ros.messages.message import LONG, MessageField, RosMessage
 from volery.ros.messages.store import store, types
 
 TYPES = sorted(types())
@@ -35,18 +35,18 @@ def values(base: str) -> some.SearchStrategy[Any]:
     return some.integers(-(2**bits) if base.startswith("int") else 0, 2**bits - 1)  # a byte has no sign
 
 
-def of_field(field: Field) -> some.SearchStrategy[Any]:
+def of_field(field: MessageField) -> some.SearchStrategy[Any]:
     one = values(field.base) if field.nested is None else messages(field.nested)
     if field.length is None:
         return one
     return some.lists(one, min_size=field.length, max_size=field.length or 3)
 
 
-def messages(cls: type[Message]) -> some.SearchStrategy[Any]:
+def messages(cls: type[RosMessage]) -> some.SearchStrategy[Any]:
     return some.builds(cls, **{field.name: of_field(field) for field in cls.fields_of})
 
 
-def by_rosbags(message: Message) -> bytes:
+def by_rosbags(message: RosMessage) -> bytes:
     return bytes(store().serialize_cdr(message.copy(), message.__msgtype__))
 
 

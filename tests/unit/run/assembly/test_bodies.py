@@ -12,16 +12,16 @@ from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.model.airframes import FRAMES as FRAMES_OF_MODELS
-from volery.model.airframes import Battery
-from volery.model.environment import Place, Vehicle, Wind
+from volery.model.airframes import BatterySpec
+from volery.model.environment import PlaceSpec, VehicleSpec, WindSpec
 from volery.model.system_loader import load
 from volery.run.assembly.bodies import body_of
 from volery.run.assembly.model_checks import vocabulary
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
+from volery.run.assembly.simulated_fleet import FleetWorld, SimulatedFleet
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
-from volery.simulation.world.body_specs import FRAMES, Multirotor, Rover
+from volery.simulation.world.body_specs import FRAMES, Multirotor, WheeledRover
 
-PAD = Place("pad", 47.4, 8.5, 400.0, 12.0, -3.0, "pad")
+PAD = PlaceSpec("pad", 47.4, 8.5, 400.0, 12.0, -3.0, "pad")
 EXAMPLES = Path(__file__).parents[4] / "examples" / "airframes"
 MODEL = """\
 volery: 1
@@ -143,7 +143,7 @@ def test_an_autopilot_is_configured_for_the_airframe(folder, frame, kind, stated
         for autopilot in stated
     ]  # fmt: skip
     kernel = VirtualKernel()
-    fleet = SimulatedFleet(kernel, vehicles, Surroundings(LocalFrame(47.0, 8.0), Wind()), 1)
+    fleet = SimulatedFleet(kernel, vehicles, FleetWorld(LocalFrame(47.0, 8.0), WindSpec()), 1)
     names = {"ardupilot": ("FRAME_CLASS", "FRAME_TYPE"), "px4": ("CA_ROTOR_COUNT", "SYS_AUTOSTART")}
     for vehicle in vehicles:
         autopilot = fleet.autopilots[vehicle.name]
@@ -207,9 +207,9 @@ def test_what_a_model_states_beside_the_file_wins(folder):
     assert (one.vehicle, one.frame, one.mass_kg) == ("quad", "quad-x", 3.0)
 
 
-@pytest.mark.parametrize(("kind", "body"), [("multirotor", Multirotor), ("rover", Rover)])
+@pytest.mark.parametrize(("kind", "body"), [("multirotor", Multirotor), ("rover", WheeledRover)])
 def test_a_body_stands_at_its_place_with_its_sensors(kind, body):
-    vehicle = Vehicle("v", kind, "ardupilot", PAD, 90.0, None, "rtk", ("airspeed",))
+    vehicle = VehicleSpec("v", kind, "ardupilot", PAD, 90.0, None, "rtk", ("airspeed",))
     spec = body_of(vehicle)
     assert isinstance(spec, body)
     assert spec.at[:2] == (12.0, -3.0)
@@ -219,7 +219,7 @@ def test_a_body_stands_at_its_place_with_its_sensors(kind, body):
 
 
 def test_a_battery_in_the_model_replaces_the_usual_one():
-    vehicle = Vehicle("v", "multirotor", "ardupilot", PAD, battery=Battery(capacity_coulomb=3600.0))
+    vehicle = VehicleSpec("v", "multirotor", "ardupilot", PAD, battery=BatterySpec(capacity_coulomb=3600.0))
     spec = body_of(vehicle)
     assert spec.battery.capacity_ah == pytest.approx(1.0)
     assert spec.added_sensors == ()

@@ -9,7 +9,7 @@ from volery.base.time import S
 from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Failure, Operation, Text
-from volery.trace.reader import Reading
+from volery.trace.reader import OpenTrace
 
 SPEAKER = """
 import rospy
@@ -63,7 +63,7 @@ def runs(tmp_path):
             model["environment"] = environment
         (tmp_path / "model.yaml").write_text(json.dumps(model))
         done = simulate(tmp_path, Options(out=tmp_path / "run", tell=run.told.append))
-        with Reading(tmp_path / "run" / "trace.mcap") as reading:
+        with OpenTrace(tmp_path / "run" / "trace.mcap") as reading:
             events = list(reading.events())
         lines = [event.text for event in events if isinstance(event, Text) and event.source in scripts]
         return done, lines, events

@@ -8,7 +8,7 @@ from volery.base.time import MS, S
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.system import Processor as ProcessorModel
+from volery.model.system import ProcessorSpec as ProcessorModel
 from volery.run.assembly.computers import load_name, start_background_load
 from volery.trace.events import Slice
 

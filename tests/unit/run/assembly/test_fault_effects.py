@@ -14,7 +14,7 @@ from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.environment import Environment, Place, Vehicle, Wind
+from volery.model.environment import Environment, PlaceSpec, VehicleSpec, WindSpec
 from volery.model.faults import (
     FAULTS,
     BarometerStuck,
@@ -37,7 +37,7 @@ from volery.model.faults import (
     WindChange,
 )
 from volery.run.assembly.fault_effects import EFFECTS, Affected, FleetLinks, inject, with_faulty_links
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
+from volery.run.assembly.simulated_fleet import FleetWorld, SimulatedFleet
 from volery.simulation.world.state_layout import (
     M_ACCEL,
     M_BARO,
@@ -50,8 +50,8 @@ from volery.simulation.world.state_layout import (
 )
 from volery.trace.events import Slice, Text
 
-PAD = Place("pad", 47.0, 8.0, 0.0, 0.0, 0.0)
-DRONE = Vehicle("drone", "multirotor", "ardupilot", PAD)
+PAD = PlaceSpec("pad", 47.0, 8.0, 0.0, 0.0, 0.0)
+DRONE = VehicleSpec("drone", "multirotor", "ardupilot", PAD)
 BEGIN, END = 2 * S, 4 * S
 FAULT = {"name": "trouble", "at_ns": BEGIN, "duration_ns": END - BEGIN}
 
@@ -67,7 +67,7 @@ class Run:
         self.fleet = SimulatedFleet(
             self.kernel,
             [drone],
-            Surroundings(LocalFrame(47.0, 8.0), Wind()),
+            FleetWorld(LocalFrame(47.0, 8.0), WindSpec()),
             1,
             through_bytes=with_faulty_links(environment),
         )
@@ -79,7 +79,7 @@ class Run:
             self.kernel,
             self.fleet,
             FleetLinks(self.fleet),
-            Wind(),
+            WindSpec(),
             {"onboard": self.processor},
             {"radio": self.network},
         )
@@ -243,7 +243,7 @@ def test_a_degraded_link_loses_or_doubles_frames(run, argument, factor):
 
 
 def test_a_vehicle_without_a_link_is_refused():
-    bird = Vehicle("bird", "multirotor", "dji", PAD)
+    bird = VehicleSpec("bird", "multirotor", "dji", PAD)
     cut = LinkCut(vehicle="bird", **FAULT)
     with pytest.raises(ModelError, match=r"trouble\.vehicle: a simulated dji has no link"):
         with_faulty_links(Environment(vehicles=(bird,), faults=(cut,)))

@@ -8,7 +8,7 @@ import pytest
 
 from rigs.standing_ardupilot import write_program
 from volery.base.errors import UsageError
-from volery.model.environment import Firmware, Place, Vehicle
+from volery.model.environment import FirmwareProgram, PlaceSpec, VehicleSpec
 from volery.run.assembly.firmware_programs import (
     FOLDER,
     ProgramFolder,
@@ -19,11 +19,11 @@ from volery.run.assembly.firmware_programs import (
 )
 from volery.simulation.real_firmware.family import RealFirmwareFamily
 
-HERE = Place("here", 47.0, 8.0, 400.0, 0.0, 0.0)
+HERE = PlaceSpec("here", 47.0, 8.0, 400.0, 0.0, 0.0)
 
 
 def vehicle(name="drone", kind="multirotor", autopilot="ardupilot", **stated):
-    return Vehicle(name, kind, autopilot, HERE, **stated)
+    return VehicleSpec(name, kind, autopilot, HERE, **stated)
 
 
 @pytest.fixture
@@ -37,7 +37,9 @@ def programs(monkeypatch, tmp_path):
 def test_a_program_is_a_family_of_its_own(programs, tmp_path):
     simulated = family_of(vehicle(version="4.5"), ProgramFolder(tmp_path))
     assert not isinstance(simulated, RealFirmwareFamily)
-    real = family_of(vehicle(firmware=Firmware("arducopter", repeatable=True)), ProgramFolder(tmp_path), 7)
+    real = family_of(
+        vehicle(firmware=FirmwareProgram("arducopter", repeatable=True)), ProgramFolder(tmp_path), 7
+    )
     assert isinstance(real, RealFirmwareFamily)
     assert (real.name, real.program, real.folder) == (
         "ardupilot",
@@ -57,16 +59,16 @@ def test_a_program_is_a_family_of_its_own(programs, tmp_path):
 )
 def test_projects_without_a_link_say_why(autopilot, said, tmp_path):
     with pytest.raises(UsageError, match=said):
-        family_of(vehicle(autopilot=autopilot, firmware=Firmware("program")), ProgramFolder(tmp_path))
+        family_of(vehicle(autopilot=autopilot, firmware=FirmwareProgram("program")), ProgramFolder(tmp_path))
 
 
 def test_at_fidelity_firmware_vehicles_fly_on_the_usual_program_of_their_kind():
-    own = vehicle("own", firmware=Firmware("./mine"))
+    own = vehicle("own", firmware=FirmwareProgram("./mine"))
     copter, rover, aircraft, kept = on_real_firmware(
         [vehicle(version="4.5", features="all"), vehicle("r", "rover"), vehicle("d", autopilot="dji"), own]
     )
-    assert copter == replace(vehicle(), firmware=Firmware("arducopter"))
-    assert rover.firmware == Firmware("ardurover")
+    assert copter == replace(vehicle(), firmware=FirmwareProgram("arducopter"))
+    assert rover.firmware == FirmwareProgram("ardurover")
     assert aircraft == vehicle("d", autopilot="dji")
     assert kept is own
 
@@ -74,7 +76,7 @@ def test_at_fidelity_firmware_vehicles_fly_on_the_usual_program_of_their_kind():
 def test_parameters_of_files_are_below_those_of_the_vehicle(tmp_path):
     (first := tmp_path / "a.parm").write_text("A 1\nB 1\nC 1\n")
     (second := tmp_path / "b.params").write_text("# of a station\n1\t1\tB\t2\t9\n1\t1\tC\t2\t9\n")
-    flown = vehicle(parameters={"C": 3.0}, firmware=Firmware("x", (first, second)))
+    flown = vehicle(parameters={"C": 3.0}, firmware=FirmwareProgram("x", (first, second)))
     assert parameters_of(flown) == {"A": 1.0, "B": 2.0, "C": 3.0}
     assert parameters_of(vehicle(parameters={"C": 3.0})) == {"C": 3.0}
 
@@ -85,10 +87,10 @@ def test_all_that_is_missing_is_named_at_once_by_vehicle(programs, tmp_path):
     with pytest.raises(UsageError) as raised:
         check_programs(
             [
-                vehicle("fits", firmware=Firmware("arducopter")),
-                vehicle("r1", "rover", firmware=Firmware("ardurover")),
-                vehicle("r2", "rover", firmware=Firmware("ardurover")),
-                vehicle("typo", firmware=Firmware("arducopter", (wrong,))),
+                vehicle("fits", firmware=FirmwareProgram("arducopter")),
+                vehicle("r1", "rover", firmware=FirmwareProgram("ardurover")),
+                vehicle("r2", "rover", firmware=FirmwareProgram("ardurover")),
+                vehicle("typo", firmware=FirmwareProgram("arducopter", (wrong,))),
                 vehicle("simulated", version="no such"),
             ]
         )
@@ -100,7 +102,7 @@ def test_all_that_is_missing_is_named_at_once_by_vehicle(programs, tmp_path):
 def test_a_folder_of_an_earlier_run_is_removed_and_nothing_else(tmp_path):
     said = []
     folder = ProgramFolder(tmp_path, said.append)
-    flown = vehicle(firmware=Firmware("/opt/bin/copter-4.5"))
+    flown = vehicle(firmware=FirmwareProgram("/opt/bin/copter-4.5"))
     left = folder.path / "drone"
     left.mkdir(parents=True)
     (left / "notes.txt").write_text("not of a program")

@@ -9,22 +9,22 @@ import pytest
 from volery.base.errors import ModelError
 from volery.base.frames import body_to_world
 from volery.model.added_sensors import (
-    Camera,
-    DepthCamera,
-    ExternalImu,
-    Lidar,
+    CameraSpec,
+    DepthCameraSpec,
+    ExternalImuSpec,
+    LidarSpec,
     Odometry,
-    RangeFinder,
-    RingLidar,
+    RangeFinderSpec,
+    RingLidarSpec,
     Sonar,
 )
-from volery.model.environment import Place, Vehicle
+from volery.model.environment import PlaceSpec, VehicleSpec
 from volery.run.assembly.mounted_sensors import sensors_of
 from volery.run.assembly.sensor_node import frames_of
 from volery.simulation.added_sensors.beams import Ranging
 
-PAD = Place("pad", 47.0, 8.0, 400.0, 0.0, 0.0)
-VEHICLE = Vehicle("v", "rover", "ardupilot", PAD)
+PAD = PlaceSpec("pad", 47.0, 8.0, 400.0, 0.0, 0.0)
+VEHICLE = VehicleSpec("v", "rover", "ardupilot", PAD)
 
 
 def made(*added):
@@ -32,7 +32,7 @@ def made(*added):
 
 
 def test_a_lidar_is_mounted_where_the_model_says():
-    settings = Lidar(
+    settings = LidarSpec(
         name="front", beams=91, field_deg=90.0, noise_m=0.02, at=(0.1, 0.2, 0.3), heading_deg=90.0
     )
     (lidar,) = made(settings)
@@ -48,11 +48,11 @@ def test_a_lidar_is_mounted_where_the_model_says():
 @pytest.mark.parametrize(
     ("settings", "topics", "ahead"),
     [
-        (RingLidar(), ["points"], (1.0, 0.0, 0.0)),
-        (RangeFinder(), ["range"], (0.0, 0.0, -1.0)),
-        (RangeFinder(name="low", pitch_deg=0.0, heading_deg=180.0), ["low/range"], (-1.0, 0.0, 0.0)),
+        (RingLidarSpec(), ["points"], (1.0, 0.0, 0.0)),
+        (RangeFinderSpec(), ["range"], (0.0, 0.0, -1.0)),
+        (RangeFinderSpec(name="low", pitch_deg=0.0, heading_deg=180.0), ["low/range"], (-1.0, 0.0, 0.0)),
         (Sonar(name="left", heading_deg=270.0), ["left/sonar"], (0.0, 1.0, 0.0)),
-        (ExternalImu(), ["imu_external"], (1.0, 0.0, 0.0)),
+        (ExternalImuSpec(), ["imu_external"], (1.0, 0.0, 0.0)),
     ],
 )
 def test_where_sensors_look_and_publish(settings, topics, ahead):
@@ -63,7 +63,7 @@ def test_where_sensors_look_and_publish(settings, topics, ahead):
 
 
 def test_a_depth_camera_is_turned_from_its_optical_frame():
-    (camera,) = made(DepthCamera(name="below", pitch_deg=90.0, at=(0.0, 0.0, -0.1)))
+    (camera,) = made(DepthCameraSpec(name="below", pitch_deg=90.0, at=(0.0, 0.0, -0.1)))
     assert [one.topic for one in camera.publications()] == [
         "below/depth/image_rect",
         "below/depth/camera_info",
@@ -74,14 +74,14 @@ def test_a_depth_camera_is_turned_from_its_optical_frame():
 
 
 def test_a_camera_looks_where_the_model_says():
-    (camera,) = made(Camera(pitch_deg=90.0, heading_deg=90.0, field_deg=90.0, at=(0.1, 0.0, -0.1)))
+    (camera,) = made(CameraSpec(pitch_deg=90.0, heading_deg=90.0, field_deg=90.0, at=(0.1, 0.0, -0.1)))
     assert camera.lens.focal == pytest.approx(160.0)
     assert camera.mounting.at == (0.1, 0.0, -0.1)
     assert body_to_world(camera.mounting.turn, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0))
     upper_edge = body_to_world(camera.mounting.turn, (0.0, -1.0, 0.0))
     assert upper_edge == pytest.approx((0.0, -1.0, 0.0))  # to the right
     with pytest.raises(ModelError, match=r"added_sensors\.camera.*less than the period of 20 ms"):
-        made(Camera(rate_hz=50.0))
+        made(CameraSpec(rate_hz=50.0))
 
 
 def test_the_estimate_of_the_autopilot_is_no_sensor_of_the_world():
@@ -92,11 +92,11 @@ def test_the_estimate_of_the_autopilot_is_no_sensor_of_the_world():
 
 def test_settings_that_contradict_one_another_are_errors_of_the_model():
     with pytest.raises(ModelError, match=r"vehicles\.v\.added_sensors\.lidar.*give the shorter one first"):
-        made(Lidar(nearest_m=20.0))
+        made(LidarSpec(nearest_m=20.0))
 
 
 def test_frames_bear_the_name_of_the_vehicle_where_several_have_such():
-    one = replace(VEHICLE, added_sensors=(Lidar(),))
+    one = replace(VEHICLE, added_sensors=(LidarSpec(),))
     plain = replace(VEHICLE, name="w", added_sensors=("airspeed",))
     assert frames_of([one, plain]) == {"v": ""}
     assert frames_of([one, replace(one, name="w")]) == {"v": "v/", "w": "w/"}

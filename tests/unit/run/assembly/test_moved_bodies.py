@@ -10,12 +10,12 @@ from volery import Options, simulate
 from volery.base.errors import ModelError, UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
-from volery.model.environment import Vehicle, Wind
+from volery.model.environment import VehicleSpec, WindSpec
 from volery.model.fmu_bodies import Fmu
 from volery.model.system_loader import load
 from volery.run.assembly.firmware_programs import ProgramFolder
 from volery.run.assembly.model_checks import vocabulary
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
+from volery.run.assembly.simulated_fleet import FleetWorld, SimulatedFleet
 from volery.run.connect import connect
 from volery.simulation.real_firmware.firmware_process import FirmwareError
 
@@ -84,15 +84,15 @@ def test_an_address_names_an_fmu(tmp_path):
         connect(f"sim:ardupilot?kind=rover&body={tmp_path}/quad.fmu")
 
 
-def vehicle(name: str, fmu: Fmu) -> Vehicle:
+def vehicle(name: str, fmu: Fmu) -> VehicleSpec:
     system = load(STARTER / "model.yaml", vocabulary())
     stated = system.vehicles[0]
-    return Vehicle(name, stated.kind, stated.autopilot, stated.at, body=fmu)
+    return VehicleSpec(name, stated.kind, stated.autopilot, stated.at, body=fmu)
 
 
 def test_the_run_says_what_moved_a_vehicle_and_keeps_what_it_printed(tmp_path):
     fmu = Fmu(make_fmu(tmp_path / "quad.fmu", version=3, without=("wind", "push")))
-    around = Surroundings(LocalFrame(47.0, 8.0), Wind())
+    around = FleetWorld(LocalFrame(47.0, 8.0), WindSpec())
     kernel = VirtualKernel()
     fleet = SimulatedFleet(kernel, [vehicle("first", fmu)], around, 1, programs=ProgramFolder(tmp_path))
     assert list(fleet.remarks()) == ["first: moved by quad.fmu (FMI 3); it does not take push, wind"]
@@ -105,7 +105,7 @@ def test_if_one_cannot_begin_the_others_are_ended(tmp_path, monkeypatch):
     good = Fmu(make_fmu(tmp_path / "good.fmu"))
     monkeypatch.setattr("rigs.multirotor_fmu._machine_code", lambda *_: b"none")
     wrong = Fmu(make_fmu(tmp_path / "wrong.fmu"))
-    around = Surroundings(LocalFrame(47.0, 8.0), Wind())
+    around = FleetWorld(LocalFrame(47.0, 8.0), WindSpec())
     with pytest.raises(FirmwareError, match=r"second: wrong.fmu cannot be loaded"):
         SimulatedFleet(
             VirtualKernel(), [vehicle("first", good), vehicle("second", wrong)], around, 1,

@@ -5,11 +5,11 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.model.airframes import Battery
-from volery.model.environment import Load, Place, Vehicle, Wind
+from volery.model.airframes import BatterySpec
+from volery.model.environment import CarriedLoad, PlaceSpec, VehicleSpec, WindSpec
 from volery.requirements.observables import TABLE
 from volery.run.assembly.place_services import serve_batteries, serve_loads
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
+from volery.run.assembly.simulated_fleet import FleetWorld, SimulatedFleet
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.trace.attachments import RunSetup
 from volery.trace.events import BatteryService, Failure, Text
@@ -21,10 +21,10 @@ class Yard:
     def __init__(self, place, loads=(), autopilot="ardupilot"):
         self.told = []
         self.kernel = VirtualKernel(record=self.told.append)
-        battery = Battery(capacity_coulomb=3600.0, charge=0.5)
-        stand = Place("stand", 47.0, 8.0, 0.0, 3.0, 0.0)
-        drone = Vehicle("drone", "multirotor", autopilot, stand, battery=battery)
-        self.fleet = SimulatedFleet(self.kernel, [drone], Surroundings(LocalFrame(47.0, 8.0), Wind()), 1)
+        battery = BatterySpec(capacity_coulomb=3600.0, charge=0.5)
+        stand = PlaceSpec("stand", 47.0, 8.0, 0.0, 3.0, 0.0)
+        drone = VehicleSpec("drone", "multirotor", autopilot, stand, battery=battery)
+        self.fleet = SimulatedFleet(self.kernel, [drone], FleetWorld(LocalFrame(47.0, 8.0), WindSpec()), 1)
         serve_batteries(self.kernel, self.fleet, [place])
         serve_loads(self.kernel, self.fleet, loads)
 
@@ -40,7 +40,7 @@ class Yard:
 
 
 def _place(east_m, **service):
-    return Place("port", 47.0, 8.0, 0.0, east_m, 0.0, "", **service)
+    return PlaceSpec("port", 47.0, 8.0, 0.0, east_m, 0.0, "", **service)
 
 
 def test_a_vehicle_that_stands_at_a_place_gets_another_battery():
@@ -107,11 +107,11 @@ def said(yard):
             if isinstance(one, Text | Failure)]  # fmt: skip
 
 
-PARCEL = Load("parcel", _place(2.0), 1.0)
+PARCEL = CarriedLoad("parcel", _place(2.0), 1.0)
 
 
 def test_a_gripper_takes_the_nearest_load_and_its_mass():
-    farther = Load("crate", _place(1.5), 2.0)
+    farther = CarriedLoad("crate", _place(1.5), 2.0)
     yard = Yard(_place(50.0), (farther, PARCEL))
     mass = yard.fleet.flights["drone"].mass
     grip(yard, 1)
@@ -132,9 +132,12 @@ def test_a_load_lies_where_it_was_left():
 @pytest.mark.parametrize(
     ("load", "what"),
     [
-        (Load("parcel", _place(9.0), 1.0), "the gripper closed on nothing: no load is within its reach"),
         (
-            Load("parcel", _place(3.0), 9.0),
+            CarriedLoad("parcel", _place(9.0), 1.0),
+            "the gripper closed on nothing: no load is within its reach",
+        ),
+        (
+            CarriedLoad("parcel", _place(3.0), 9.0),
             "parcel stays: its 9 kg are too heavy, 5.5 kg more can be lifted",
         ),
     ],

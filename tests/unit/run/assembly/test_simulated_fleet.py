@@ -14,10 +14,10 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.model.environment import Place, Vehicle, Wind
+from volery.model.environment import PlaceSpec, VehicleSpec, WindSpec
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings, surroundings_of
+from volery.run.assembly.simulated_fleet import FleetWorld, SimulatedFleet, surroundings_of
 from volery.simulation.added_sensors.beams import Ranging
 from volery.simulation.added_sensors.lidar import Lidar
 from volery.simulation.autopilots.fleet_autopilot import firmwares
@@ -58,9 +58,9 @@ def test_an_autopilot_that_drives_the_motors_hovers_in_a_model(hovering, tmp_pat
 
 
 def _fleet(*kinds: str) -> SimulatedFleet:
-    here = Place("here", 47.0, 8.0, 0.0, 0.0, 0.0)
-    vehicles = [Vehicle(f"{kind}_{at}", kind, "hovering", here) for at, kind in enumerate(kinds)]
-    return SimulatedFleet(VirtualKernel(), vehicles, Surroundings(LocalFrame(47.0, 8.0), Wind()), 1)
+    here = PlaceSpec("here", 47.0, 8.0, 0.0, 0.0, 0.0)
+    vehicles = [VehicleSpec(f"{kind}_{at}", kind, "hovering", here) for at, kind in enumerate(kinds)]
+    return SimulatedFleet(VirtualKernel(), vehicles, FleetWorld(LocalFrame(47.0, 8.0), WindSpec()), 1)
 
 
 def test_progress_and_transmitter_are_those_of_the_autopilot(hovering):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import UsageError
-from volery.model.environment import Firmware
+from volery.model.environment import FirmwareProgram
 from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.vehicles.address import parse
 
@@ -17,10 +17,10 @@ def described(url, kind="multirotor"):
 
 
 def test_a_firmware_address_has_the_usual_program_of_the_kind():
-    assert described("firmware:ardupilot").vehicle.firmware == Firmware("arducopter")
-    assert described("firmware:ardupilot", "rover").vehicle.firmware == Firmware("ardurover")
-    assert described("firmware:ardupilot?kind=rover").vehicle.firmware == Firmware("ardurover")
-    assert described("firmware:px4").vehicle.firmware == Firmware("px4")
+    assert described("firmware:ardupilot").vehicle.firmware == FirmwareProgram("arducopter")
+    assert described("firmware:ardupilot", "rover").vehicle.firmware == FirmwareProgram("ardurover")
+    assert described("firmware:ardupilot?kind=rover").vehicle.firmware == FirmwareProgram("ardurover")
+    assert described("firmware:px4").vehicle.firmware == FirmwareProgram("px4")
     assert described("sim:px4").vehicle.firmware is None
 
 
@@ -30,7 +30,9 @@ def test_a_firmware_address_has_options_of_its_own_and_those_of_the_world():
         "&start=warm&heading=90&wind=5,270,1&wire=bytes&drop=0.1&system=7"
     )
     flown = wanted.vehicle
-    assert flown.firmware == Firmware("/opt/px4", (Path("a.params"), Path("b.params")), repeatable=True)
+    assert flown.firmware == FirmwareProgram(
+        "/opt/px4", (Path("a.params"), Path("b.params")), repeatable=True
+    )
     assert (flown.autopilot, flown.parameters) == ("px4", {"A": 1.0, "B": 2.0})
     assert (flown.started, flown.heading_deg) == ("warm", 90.0)
     assert (wanted.wind.speed_m_s, wanted.system) == (5.0, 7)

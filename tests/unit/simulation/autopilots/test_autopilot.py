@@ -17,7 +17,7 @@ from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
 
@@ -66,7 +66,7 @@ def test_a_version_selects_the_firmwares_and_an_unknown_one_is_refused() -> None
 
 
 def test_the_kind_of_body_selects_the_firmware() -> None:
-    yard = Yard(Multirotor(), Rover(at=(5.0, 0.0, 0.0)))
+    yard = Yard(Multirotor(), WheeledRover(at=(5.0, 0.0, 0.0)))
     assert yard.autopilot(0).firmware.kind == "multirotor"
     assert yard.autopilot(1, system=2).firmware.kind == "rover"
 

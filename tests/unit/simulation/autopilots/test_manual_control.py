@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.manual_control import ChannelRange, RcChannels, StickMap
+from volery.simulation.autopilots.manual_control import ChannelRange, ReceivedChannels, StickMap
 
 STICK = ChannelRange(1000, 1500, 2000, 20)
 THROTTLE = ChannelRange(1000, 1500, 2000, 30)
@@ -40,7 +40,7 @@ def test_a_channel_range_of_zero_width_gives_zero(travel: ChannelRange) -> None:
 
 
 def test_an_override_holds_until_it_is_released() -> None:
-    sticks = RcChannels([1500, 1500, 1000])
+    sticks = ReceivedChannels([1500, 1500, 1000])
     sticks.override(3, 1700, 0)
     assert sticks.pulses() == [1500, 1500, 1700]
     assert sticks[3] == 1700
@@ -50,7 +50,7 @@ def test_an_override_holds_until_it_is_released() -> None:
 
 
 def test_an_override_that_is_not_repeated_expires_alone() -> None:
-    sticks = RcChannels([1500, 1500, 1000])
+    sticks = ReceivedChannels([1500, 1500, 1000])
     sticks.override(1, 1600, 0)
     sticks.override(2, 1600, 2 * S)
     assert not sticks.expire(3 * S, 3 * S)
@@ -59,14 +59,14 @@ def test_an_override_that_is_not_repeated_expires_alone() -> None:
 
 
 def test_channels_that_do_not_exist_are_not_overridden() -> None:
-    sticks = RcChannels([1500])
+    sticks = ReceivedChannels([1500])
     sticks.override(0, 1700, 0)
     sticks.override(2, 1700, 0)
     assert sticks.pulses() == [1500]
 
 
 def test_a_stick_map_selects_the_channel_of_each_stick() -> None:
-    sticks = RcChannels([1000, 2000, 1500, 1500])
+    sticks = ReceivedChannels([1000, 2000, 1500, 1500])
     pilot = StickMap(roll=2, pitch=1, throttle=3, yaw=4, travels=(STICK, STICK, THROTTLE, STICK)).read(sticks)
     assert (pilot.roll, pilot.pitch, pilot.yaw) == (1.0, -1.0, 0.0)
     assert pilot.throttle == pytest.approx(0.4845, abs=1e-4)

@@ -29,7 +29,7 @@ from volery.simulation.real_firmware.px4 import (
     rate_gains,
     write_start_scripts,
 )
-from volery.simulation.world.body_specs import FRAMES, Multirotor, Rover, frame_rotors
+from volery.simulation.world.body_specs import FRAMES, Multirotor, WheeledRover, frame_rotors
 
 RECORDING = Path(__file__).parents[3] / "golden" / "firmware" / "px4-1.17.0.json.gz"
 BATTERY = Outgoing("BATTERY_STATUS", "iihHHHHHHHHHHhBBBb", (3, 180))
@@ -294,7 +294,7 @@ def test_start_scripts_that_cannot_be_copied_are_named_once(tmp_path: Path) -> N
 
 def test_rover_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="drone_1: a real PX4 flies multirotors here"):
-        flown(tmp_path, spec=Rover())
+        flown(tmp_path, spec=WheeledRover())
 
 
 def test_a_second_instance_has_another_number(tmp_path: Path) -> None:

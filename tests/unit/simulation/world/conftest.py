@@ -4,9 +4,9 @@ import pytest
 
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.simulation.world.body_specs import Battery
+from volery.simulation.world.body_specs import BatteryPack
 
-IDEAL = Battery(capacity_ah=1e12, resistance_ohm=1e-18)
+IDEAL = BatteryPack(capacity_ah=1e12, resistance_ohm=1e-18)
 
 
 class Clock:

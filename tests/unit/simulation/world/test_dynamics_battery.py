@@ -5,7 +5,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.simulation.world.body_specs import Battery, Multirotor, Rover
+from volery.simulation.world.body_specs import BatteryPack, Multirotor, WheeledRover
 from volery.simulation.world.dynamics import battery_current, cell_voltage
 from volery.simulation.world.state_layout import U_THROTTLE
 from volery.simulation.world.world import STEP, World
@@ -48,7 +48,7 @@ def own_ocv(left):
 
 def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
     """Against an integration of its own: powers from rotor speeds, currents from the circuit, trapezoids."""
-    spec = Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.5))
+    spec = Multirotor(sensors="perfect", battery=BatteryPack(capacity_ah=0.5))
     world = World(clock, [spec], frame=frame)
     truth = world.truth(0)
     charge, energy, payload, now = 0.0, 0.0, 0.0, None
@@ -86,7 +86,7 @@ def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
 
 
 def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
-    spec = Multirotor(sensors="perfect", battery=Battery(capacity_ah=1.3))
+    spec = Multirotor(sensors="perfect", battery=BatteryPack(capacity_ah=1.3))
     world = World(clock, [spec], frame=frame)
     world.set_input(0, U_THROTTLE, 1.0, 1.0, 1.0, 1.0)
     clock.wait(1)
@@ -99,7 +99,7 @@ def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
 
 
 def test_driving_costs_more_than_standing(clock, frame):
-    world = World(clock, [Rover(sensors="perfect", idle_power=5.0)] * 2, frame=frame)
+    world = World(clock, [WheeledRover(sensors="perfect", idle_power=5.0)] * 2, frame=frame)
     world.set_input(0, U_THROTTLE, 0.0, 0.2)
     clock.wait(30)
     driving, standing = world.truth(0), world.truth(1)
@@ -112,7 +112,7 @@ def test_driving_costs_more_than_standing(clock, frame):
 )
 def test_an_impossible_battery_is_refused(values):
     with pytest.raises(UsageError, match="battery"):
-        Battery(**values)
+        BatteryPack(**values)
 
 
 def test_a_cell_breaks_down_once_it_is_empty():
@@ -122,7 +122,7 @@ def test_a_cell_breaks_down_once_it_is_empty():
 
 
 def test_an_empty_battery_stops_the_rotors(clock, frame):
-    world = World(clock, [Multirotor(sensors="perfect", battery=Battery(capacity_ah=0.05))], frame=frame)
+    world = World(clock, [Multirotor(sensors="perfect", battery=BatteryPack(capacity_ah=0.05))], frame=frame)
     world.set_input(0, U_THROTTLE, 0.7, 0.7, 0.7, 0.7)
     clock.wait(3)
     assert world.truth(0).position[2] > 2.0
@@ -138,7 +138,7 @@ def test_an_empty_battery_stops_the_rotors(clock, frame):
     [
         (Multirotor, {"mass": 0.0}, "multirotor: mass"),
         (Multirotor, {"inertia": (0.02, 0.0, 0.04)}, "multirotor: inertia"),
-        (Rover, {"wheelbase": -1.0}, "rover: wheelbase"),
+        (WheeledRover, {"wheelbase": -1.0}, "rover: wheelbase"),
     ],
 )
 def test_an_impossible_body_is_refused(spec, values, name):

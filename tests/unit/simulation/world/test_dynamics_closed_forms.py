@@ -5,7 +5,7 @@ import math
 import pytest
 
 from volery.base.time import S
-from volery.simulation.world.body_specs import STANDARD_GRAVITY, Multirotor, Rover
+from volery.simulation.world.body_specs import STANDARD_GRAVITY, Multirotor, WheeledRover
 from volery.simulation.world.dynamics import S_SPEED, S_STEER, write_quaternion
 from volery.simulation.world.state_layout import (
     S_ATTITUDE,
@@ -102,7 +102,7 @@ def test_motor_lag_is_first_order(clock, frame, dragless):
 
 
 def test_a_rover_speeds_up_with_its_lag_and_drives_a_circle_of_its_wheelbase(clock, frame, ideal_battery):
-    spec = Rover(sensors="perfect", battery=ideal_battery, speed_top=2.0, grip=100.0)
+    spec = WheeledRover(sensors="perfect", battery=ideal_battery, speed_top=2.0, grip=100.0)
     world = World(clock, [spec], frame=frame)
     row = world.arrays.rows[0]
     row[U_THROTTLE + 1] = 1.0
@@ -121,7 +121,7 @@ def test_a_rover_speeds_up_with_its_lag_and_drives_a_circle_of_its_wheelbase(clo
 
 
 def test_a_skid_steered_rover_turns_on_the_spot(clock, frame, ideal_battery):
-    spec = Rover(sensors="perfect", battery=ideal_battery, skid=True)
+    spec = WheeledRover(sensors="perfect", battery=ideal_battery, skid=True)
     world = World(clock, [spec], frame=frame)
     world.set_input(0, U_THROTTLE, 0.5, 0.0)
     clock.wait(3)

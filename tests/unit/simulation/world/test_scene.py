@@ -10,7 +10,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import S
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 from volery.simulation.world.scene import Cylinder, Scene, Solid, contact
 from volery.simulation.world.state_layout import U_THROTTLE
 from volery.simulation.world.world import World
@@ -29,7 +29,7 @@ BRIDGE = box("bridge", -2.0, 10.0, 2.0, 30.0, floor=6.0, ceiling=7.0)
 class Flown:
     """A world of one body whose time is set by hand."""
 
-    def __init__(self, body: Multirotor | Rover, *solids: Solid) -> None:
+    def __init__(self, body: Multirotor | WheeledRover, *solids: Solid) -> None:
         self.at = 0
         self.world = World(lambda: self.at, [body], frame=FRAME, scene=Scene(solids))
 
@@ -187,7 +187,7 @@ def test_a_multirotor_stands_and_begins_on_a_roof():
 
 
 def test_a_rover_that_drives_against_a_house_stops_and_can_turn_back():
-    flown = Flown(Rover(heading_deg=90.0), TOWER)
+    flown = Flown(WheeledRover(heading_deg=90.0), TOWER)
     flown.fly(6.0, 0.0, 0.3)
     hit = flown.world.last_collision(0)
     assert hit is not None

@@ -8,7 +8,7 @@ import pytest
 from volery.simulation.autopilots.flight_stack import flight_state
 from volery.simulation.autopilots.flight_stack.flight import Setpoint
 from volery.simulation.world import state_layout
-from volery.simulation.world.state_layout import Layout
+from volery.simulation.world.state_layout import ColumnLayout
 
 LAYOUTS = [(state_layout, state_layout.WORLD_LAYOUT), (flight_state, flight_state.FLIGHT_LAYOUT)]
 PREFIXES = ("S_", "U_", "M_", "P_", "W_", "C_", "K_")
@@ -107,10 +107,10 @@ def test_a_set_point_fills_the_command_columns_in_their_order():
 
 
 def test_a_layout_allots_columns_in_the_order_of_declaration():
-    first = Layout()
+    first = ColumnLayout()
     assert [first.add("A", "m", "a"), first.add("B", "m", "b", 3, "x, y, z"), first.add("C", "m", "c")] == [
         0,
         1,
         4,
     ]
-    assert Layout(after=first).add("D", "m", "d") == 5
+    assert ColumnLayout(after=first).add("D", "m", "d") == 5

@@ -8,7 +8,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 from volery.simulation.world.environment_models import Terrain, Wind, magnetic_field
 from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import declared_sigma, sensor_suite
@@ -23,7 +23,7 @@ from volery.simulation.world.state_layout import (
 )
 from volery.simulation.world.world import STEP, World
 
-SPECS = (Multirotor(), Rover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))
+SPECS = (Multirotor(), WheeledRover(at=(20.0, 0.0, 0.0)), Multirotor(at=(0.0, 30.0, 0.0), sensors="rtk"))
 
 
 def fly(clock, frame, reads, seed=3, wind=None):
@@ -149,7 +149,7 @@ def test_terrain_is_bilinear_between_its_posts_and_level_beyond(clock, frame):
     assert terrain.height(-50.0, 0.0) == pytest.approx(0.0, abs=1e-3)
     assert terrain.height(50.0, 50.0) == pytest.approx(30.0, abs=1e-3)
     world = World(
-        clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, scene=Scene(terrain=terrain)
+        clock, [WheeledRover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, scene=Scene(terrain=terrain)
     )
     world.set_input(0, U_THROTTLE, 0.0, 0.1)
     clock.wait(4)
@@ -237,7 +237,7 @@ def test_the_magnetic_field_matches_published_charts(latitude, longitude, declin
 
 
 def test_payload_power_acts_from_the_next_grid_step_on(clock, frame):
-    world = World(clock, [Rover()], frame=frame)
+    world = World(clock, [WheeledRover()], frame=frame)
     world.payload_power(0, 12.0)
     assert world.arrays.rows[0, U_PAYLOAD] == 0.0
     clock.wait(10)

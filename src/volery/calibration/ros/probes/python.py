@@ -98,14 +98,14 @@ class Rospy:
 
     def advertise(self, topic: str) -> Ends:
         """Create a publisher whose ``publish`` returns before the message is sent."""
-        made = self._rospy.Publisher(topic, self._type, queue_size=DEPTH)
+        publisher = self._rospy.Publisher(topic, self._type, queue_size=DEPTH)
         message = self._type(data=[0.0] * 4)
-        return Ends(lambda: made.publish(message), made.get_num_connections, made.unregister)
+        return Ends(lambda: publisher.publish(message), publisher.get_num_connections, publisher.unregister)
 
     def subscribe(self, topic: str) -> Ends:
         """Create a subscription."""
-        made = self._rospy.Subscriber(topic, self._type, on_message, queue_size=DEPTH)
-        return Ends(lambda: None, made.get_num_connections, made.unregister)
+        subscriber = self._rospy.Subscriber(topic, self._type, on_message, queue_size=DEPTH)
+        return Ends(lambda: None, subscriber.get_num_connections, subscriber.unregister)
 
     def service_client(self) -> object:
         """Create a proxy of a service."""
@@ -129,8 +129,8 @@ class Rospy:
             on_message(request)
             return response()
 
-        made = self._rospy.Service("calibration/answer", self._service, answer)
-        return lambda: made.shutdown("measured")
+        service = self._rospy.Service("calibration/answer", self._service, answer)
+        return lambda: service.shutdown("measured")
 
     def sleeper(self, seconds: float) -> Callable[[], Any]:
         """Return ``Rate.sleep``."""
@@ -163,31 +163,31 @@ class Rclpy:
 
     def advertise(self, topic: str) -> Ends:
         """Create a reliable publisher."""
-        made = self._node.create_publisher(self._type, topic, DEPTH)
+        publisher = self._node.create_publisher(self._type, topic, DEPTH)
         message = self._type(data=[0.0] * 4)
         return Ends(
-            lambda: made.publish(message),
-            made.get_subscription_count,
-            lambda: self._node.destroy_publisher(made),
+            lambda: publisher.publish(message),
+            publisher.get_subscription_count,
+            lambda: self._node.destroy_publisher(publisher),
         )
 
     def subscribe(self, topic: str) -> Ends:
         """Create a reliable subscription."""
-        made = self._node.create_subscription(self._type, topic, on_message, DEPTH)
+        subscription = self._node.create_subscription(self._type, topic, on_message, DEPTH)
         peers = lambda: self._node.count_publishers(topic)  # noqa: E731 - one of three that belong together
-        return Ends(lambda: None, peers, lambda: self._node.destroy_subscription(made))
+        return Ends(lambda: None, peers, lambda: self._node.destroy_subscription(subscription))
 
     def service_client(self) -> object:
         """Create a client."""
-        made: object = self._node.create_client(self._service, "calibration/absent")
-        return made
+        client: object = self._node.create_client(self._service, "calibration/absent")
+        return client
 
     def advertise_service(self) -> object:
         """Create a service."""
-        made: object = self._node.create_service(
+        service: object = self._node.create_service(
             self._service, "calibration/service", lambda request, response: response
         )
-        return made
+        return service
 
     def caller(self) -> Callable[[], Any]:
         """Return a call of the peers' service that spins until the answer is there."""
@@ -203,8 +203,8 @@ class Rclpy:
             on_message(request)
             return response
 
-        made = self._node.create_service(self._service, "calibration/answer", answer)
-        return lambda: self._node.destroy_service(made)
+        service = self._node.create_service(self._service, "calibration/answer", answer)
+        return lambda: self._node.destroy_service(service)
 
     def sleeper(self, seconds: float) -> Callable[[], Any]:
         """Return ``Clock.sleep_for``."""
@@ -413,7 +413,7 @@ class Probe:
 
 
 def _numbers(text: str) -> list[float]:
-    return [float(one) for one in text.split(",")]
+    return [float(word) for word in text.split(",")]
 
 
 def main(library: str, block_ms: str, periods: str, sleeps: str, counts: str) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from volery.ros.messages.encodings import Constant, Layout
+from volery.ros.messages.encodings import Constant, MessageLayout
 
 SHARED_INCLUDE = Path(__file__).parents[1] / "include"
 """Headers that all C++ components may include."""
@@ -41,9 +41,9 @@ def refusal(name: str, remedy: str) -> str:
     return f"{NOT_OFFERED}<{name}> is not offered: {remedy}\n"
 
 
-def constant_lines(layout: Layout, bases: Callable[[str], str]) -> list[str]:
+def constant_lines(layout: MessageLayout, bases: Callable[[str], str]) -> list[str]:
     """Return the constants of a message as members; *bases* gives the type of a number."""
-    return [f"    {_constant(one, bases)}" for one in layout.constants]
+    return [f"    {_constant(constant, bases)}" for constant in layout.constants]
 
 
 def _constant(one: Constant, bases: Callable[[str], str]) -> str:
@@ -60,11 +60,13 @@ def text_literal(text: str) -> str:
     return f'"{escaped}"'
 
 
-def visit_lines(layout: Layout) -> list[str]:
+def visit_lines(layout: MessageLayout) -> list[str]:
     """Return the members by which a message is encoded, decoded and printed, and its name."""
     lines = ["    template <class Visitor, class Message>"]
     lines += ["    static void each_([[maybe_unused]] Visitor& visit, [[maybe_unused]] Message& message) {"]
-    lines += [f'        visit("{one.name}", message.{one.name});' for one in layout.fields if one.carried]
-    if not any(one.carried for one in layout.fields):
+    lines += [
+        f'        visit("{field.name}", message.{field.name});' for field in layout.fields if field.carried
+    ]
+    if not any(field.carried for field in layout.fields):
         lines += ["        visit.nothing();"]
     return [*lines, "    }", f'    static const char* name_() {{ return "{layout.name}"; }}']

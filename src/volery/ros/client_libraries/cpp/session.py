@@ -12,7 +12,7 @@ from volery.kernel.task import Task
 from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.abi_codec import CppFiber
 from volery.ros.client_libraries.library_base import Launch
-from volery.ros.graph import Group, Node, RosGraph, ServiceError
+from volery.ros.graph import Node, ReadyCallbacks, RosGraph, ServiceError
 from volery.trace.events import Failure
 
 Entity = TypeVar("Entity")
@@ -61,7 +61,7 @@ class CppSession(ABC):
     def end(self) -> None:
         """Shut down: leave the graph; spinning tasks return."""
 
-    def group(self, number: int) -> Group:
+    def group(self, number: int) -> ReadyCallbacks:
         """Return the queue with a number, of which -1 is the node's own."""
         return self.node.own_group if number < 0 else self.entity(number)
 

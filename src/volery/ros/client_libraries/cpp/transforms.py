@@ -11,7 +11,7 @@ from volery.ros.client_libraries.abi_codec import Reader, Writer
 from volery.ros.client_libraries.cpp.session import CppSession
 from volery.ros.client_libraries.tf2.tf2_ros import TF, TF_STATIC, Buffer
 from volery.ros.client_libraries.tf2.transform_tree import TransformException
-from volery.ros.graph import AS_OFFERED, Group
+from volery.ros.graph import AS_OFFERED, ReadyCallbacks
 from volery.ros.graph.work import Work
 from volery.ros.messages import from_cdr, to_cdr
 
@@ -39,7 +39,9 @@ class _WatchedBuffer(Buffer):
 class _Watch:
     """Calls back in the tasks of a queue after changes of a buffer, once for changes at one time."""
 
-    def __init__(self, session: CppSession, buffer: _WatchedBuffer, callback: int, group: Group) -> None:
+    def __init__(
+        self, session: CppSession, buffer: _WatchedBuffer, callback: int, group: ReadyCallbacks
+    ) -> None:
         self._session, self._buffer, self._callback, self._group = session, buffer, callback, group
         self._pending = False
         buffer.watches[self] = None
@@ -110,10 +112,10 @@ def _can(session: CppSession, arguments: Reader) -> str:
 
 def _look_up(session: CppSession, arguments: Reader) -> bytes:
     try:
-        found = _buffer(session, arguments).lookup_transform(*_question(arguments))
+        transform = _buffer(session, arguments).lookup_transform(*_question(arguments))
     except TransformException as error:
         return Writer().flag(False).text(type(error).__name__).text(str(error)).done()
-    return Writer().flag(True).done() + to_cdr(found)
+    return Writer().flag(True).done() + to_cdr(transform)
 
 
 TRANSFORMS: dict[str, Callable[[CppSession, Reader], Any]] = {

@@ -18,7 +18,7 @@ from volery.ros.client_libraries.cpp.message_structs import (
     visit_lines,
     with_ours,
 )
-from volery.ros.messages.encodings import FieldLayout, Layout, ros2_layout
+from volery.ros.messages.encodings import FieldLayout, MessageLayout, ros2_layout
 from volery.ros.messages.store import action_types
 
 INCLUDE = Path(__file__).parent / "include"
@@ -157,9 +157,9 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
 def _remedy(name: str, generator: _Generator) -> str:
     """Return what to do instead of including a header that is not offered; empty where nothing is known."""
     package, _, rest = name.partition("/")
-    found = _HEADER.match(name)
-    if found and package in generator.packages:
-        return f"{package} has {choices(generator.names(package, found[2])) or 'nothing'} in {found[2]}"
+    match = _HEADER.match(name)
+    if match and package in generator.packages:
+        return f"{package} has {choices(generator.names(package, match[2])) or 'nothing'} in {match[2]}"
     ros1 = _ROS1_HEADER.match(name)
     if ros1 and package in generator.packages:
         return f"it is a header of ROS 1; include <{package}/msg/{_snake(ros1[2])}.hpp>"
@@ -260,7 +260,10 @@ class _Generator:
         layouts = [ros2_layout(name) for name in structs]
         own = set(structs)
         nested = dict.fromkeys(
-            one.nested for layout in layouts for one in layout.fields if one.nested and one.nested not in own
+            field.nested
+            for layout in layouts
+            for field in layout.fields
+            if field.nested and field.nested not in own
         )
         lines = [
             f"// Generated from the definition of {full}.",
@@ -289,7 +292,7 @@ def _service(label: str, full: str) -> list[str]:
     ]
 
 
-def _struct(layout: Layout) -> list[str]:
+def _struct(layout: MessageLayout) -> list[str]:
     package, kind, label = layout.name.split("/")
     lines = ["", f"namespace {package}::{kind} {{", ""]
     # The parameter is whether members are initialised, which they always are here.
@@ -299,7 +302,7 @@ def _struct(layout: Layout) -> list[str]:
         f"    explicit {label}(rosidl_runtime_cpp::MessageInitialization) {{}}",
     ]
     lines += constant_lines(layout, _TYPES.__getitem__)
-    lines += [f"    {_type(one)} {one.name}{_initial(one)};" for one in layout.fields]
+    lines += [f"    {_type(field)} {field.name}{_initial(field)};" for field in layout.fields]
     for one in layout.fields:
         lines += [f"    using _{one.name}_type = {_type(one)};"]
         lines += [f"    {label}& set__{one.name}(const _{one.name}_type& value) {{"]

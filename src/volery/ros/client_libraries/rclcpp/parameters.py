@@ -32,8 +32,8 @@ def read_parameters(arguments: Reader) -> list[Parameter]:
 def write_parameters(writer: Writer, parameters: Sequence[Parameter]) -> Writer:
     """Append a list of parameters."""
     writer.integer(len(parameters))
-    for one in parameters:
-        writer.raw(to_cdr(one.to_parameter_msg()))
+    for parameter in parameters:
+        writer.raw(to_cdr(parameter.to_parameter_msg()))
     return writer
 
 
@@ -73,8 +73,8 @@ def create_parameters(
         event.deleted_parameters = [one.to_parameter_msg() for one in deleted]
         events[0].publish(event)
 
-    made = DeclaredParameters(node.node, overrides, undeclared, publish)
-    made.declare_builtin("use_sim_time", False)
+    parameters = DeclaredParameters(node.node, overrides, undeclared, publish)
+    parameters.declare_builtin("use_sim_time", False)
     if served and isinstance(session.graph, EmbeddedGraph):  # the node of a transport serves them itself
         ready = node.queues[0].ready
 
@@ -85,8 +85,8 @@ def create_parameters(
 
             return node.node.serve(name, kind._type, handler, ready)
 
-        serve_parameters(_Served(made), create_service)
-    return made
+        serve_parameters(_Served(parameters), create_service)
+    return parameters
 
 
 def _declared(session: Session, arguments: Reader) -> DeclaredParameters:

@@ -36,7 +36,7 @@ from volery.ros.client_libraries.rclpy.qos import (
     graph_qos,
 )
 from volery.ros.client_libraries.rclpy.ros_time import Duration
-from volery.ros.graph import Client, EmbeddedGraph, Group, QoS, Service, ServiceError, Timer, Work
+from volery.ros.graph import Client, EmbeddedGraph, QoS, ReadyCallbacks, Service, ServiceError, Timer, Work
 from volery.ros.messages import from_cdr, service, to_cdr
 
 SHORTEST_PERIOD: Ns = MS
@@ -184,7 +184,7 @@ def _wait_for_message(session: Session, arguments: Reader) -> bytes:
 class _Server:
     """A service whose handler is code. A deferred one is answered by a request of the code."""
 
-    def __init__(self, session: Session, kind: str, callback: int, queue: Group) -> None:
+    def __init__(self, session: Session, kind: str, callback: int, queue: ReadyCallbacks) -> None:
         self._session, self._callback, self._queue = session, callback, queue
         self._response = service(kind).response.__msgtype__
         self._count = 0
@@ -251,7 +251,7 @@ class _Client:
         self._count = 0
         self.ready, self.wait = client.ready, client.wait
 
-    def send(self, request: bytes, callback: int, queue: Group) -> int:
+    def send(self, request: bytes, callback: int, queue: ReadyCallbacks) -> int:
         """Send a request; return its number, with which the response is given to the code."""
         session, message = self._session, from_cdr(self._request, request)
         self._count += 1
@@ -294,7 +294,9 @@ def _send(session: Session, arguments: Reader) -> int:
 class _Timer:
     """A timer, which calls the callable numbered *callback* each period."""
 
-    def __init__(self, session: Session, node: RosNode, period: Ns, callback: int, group: Group) -> None:
+    def __init__(
+        self, session: Session, node: RosNode, period: Ns, callback: int, group: ReadyCallbacks
+    ) -> None:
         self._session, self._node, self._callback, self._group = session, node, callback, group
         self._period = max(period, SHORTEST_PERIOD)
         self._started: Ns = 0
@@ -397,7 +399,7 @@ def _count(session: Session, arguments: Reader, end: str) -> int:
     node = _node(session, arguments)
     name = node.node.resolve(node.absolute_name(arguments.text()))
     with session.kernel.interact():
-        return sum(len(getattr(one, end)) for one in session.graph.topics() if one.name == name)
+        return sum(len(getattr(topic, end)) for topic in session.graph.topics() if topic.name == name)
 
 
 _EXCEPTIONS = (*EXCEPTIONS.values(), *NAME_EXCEPTIONS.values(), ExecutorError)
@@ -466,7 +468,9 @@ _PLAIN: dict[str, Simple[Session]] = {
     "executor_cancel": lambda session, arguments: _executor(session, arguments).cancel(),
     "executor_spinning": lambda session, arguments: _executor(session, arguments).spinning,
     "nodes": lambda session, arguments: _texts(sorted(session.graph.node_names())),
-    "topics": lambda session, arguments: _pairs([(one.name, one.type) for one in session.graph.topics()]),
+    "topics": lambda session, arguments: _pairs(
+        [(topic.name, topic.type) for topic in session.graph.topics()]
+    ),
     "services": lambda session, arguments: _pairs([(one.name, one.type) for one in session.graph.services()]),
     "count_publishers": lambda session, arguments: _count(session, arguments, "publishers"),
     "count_subscribers": lambda session, arguments: _count(session, arguments, "subscribers"),

@@ -17,13 +17,13 @@ from volery.ros.client_libraries.rclpy.names import (
     validate_node_name,
     validate_topic_name,
 )
-from volery.ros.graph import Group, Node
+from volery.ros.graph import Node, ReadyCallbacks
 
 
 class CallbackQueue:
     """Ready callbacks of one group of a node; of an exclusive group one runs at a time."""
 
-    def __init__(self, ready: Group, *, exclusive: bool, automatic: bool) -> None:
+    def __init__(self, ready: ReadyCallbacks, *, exclusive: bool, automatic: bool) -> None:
         self.ready, self.exclusive, self.automatic = ready, exclusive, automatic
         self.running = False
 
@@ -131,7 +131,7 @@ class Session(CppSession):
         """Return the group of callbacks with a number."""
         return self.find(number, CallbackQueue)
 
-    def group(self, number: int) -> Group:
+    def group(self, number: int) -> ReadyCallbacks:
         """Return the queue on the graph of a group with a number; -1 is the first node's own."""
         return self.node.own_group if number < 0 else self.queue(number).ready
 

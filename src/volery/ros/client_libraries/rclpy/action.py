@@ -482,7 +482,7 @@ _FEEDBACK = "/_action/feedback"
 
 def _actions(topics: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
     return [
-        (name.removesuffix(_FEEDBACK), [one.removesuffix("_FeedbackMessage") for one in kinds])
+        (name.removesuffix(_FEEDBACK), [kind.removesuffix("_FeedbackMessage") for kind in kinds])
         for name, kinds in topics
         if name.endswith(_FEEDBACK)
     ]

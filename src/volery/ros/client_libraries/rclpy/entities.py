@@ -21,7 +21,7 @@ from volery.ros.client_libraries.rclpy.qos import graph_qos, profile_of
 from volery.ros.client_libraries.rclpy.ros_time import Clock
 from volery.ros.graph import CallFailedError, EmbeddedGraph, RosGraph, ServiceError, Work
 from volery.ros.graph import Node as GraphNode
-from volery.ros.messages import Message, from_cdr, to_cdr
+from volery.ros.messages import RosMessage, from_cdr, to_cdr
 from volery.ros.messages.client_classes import (
     Odd,
     adopt,
@@ -122,8 +122,8 @@ class Publisher:
                 raise RCLError(f"Failed to publish: cannot publish data: {wrong}")
         self._made.publish(msg)
         if odd_values:
-            for one in take_odd_values(msg):
-                self._warn(one)
+            for value in take_odd_values(msg):
+                self._warn(value)
 
     def _warn(self, odd: Odd) -> None:
         """Log once a source line and field that rclpy sends another value than it is given."""
@@ -292,7 +292,7 @@ class Service:
         return self._checked(self.callback(request, self.srv_type.Response()))
 
     def _checked(self, response: Any) -> Any:
-        if not isinstance(response, Message):
+        if not isinstance(response, RosMessage):
             raise TypeError(f"service {self.srv_name}: its callback returned {response!r}, not a response")
         return response
 

@@ -15,7 +15,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.ros.client_libraries.rclpy.qos import QoSPolicyKind
-from volery.ros.graph import EmbeddedGraph, Group, QoS, RosGraph, Work
+from volery.ros.graph import EmbeddedGraph, QoS, ReadyCallbacks, RosGraph, Work
 from volery.ros.graph.endpoints import incompatible
 
 
@@ -137,7 +137,7 @@ def watch(
     graph: RosGraph,
     watched: Any,
     callbacks: PublisherEventCallbacks | SubscriptionEventCallbacks,
-    ready: Group,
+    ready: ReadyCallbacks,
 ) -> None:
     """Call the callbacks of a publisher or a subscription from now on.
 
@@ -194,7 +194,7 @@ class _Monitor:
             self._emit("message_lost", QoSMessageLostInfo(lost, lost - self._lost))
             self._lost = lost
         times = [self._deadline(now), self._own_lease(now) if self._is_publisher else self._liveliness(now)]
-        return min((one for one in times if one is not None), default=None)
+        return min((time for time in times if time is not None), default=None)
 
     def _why(self, other: Any) -> str:
         pair = (self._watched.qos, other.qos) if self._is_publisher else (other.qos, self._watched.qos)

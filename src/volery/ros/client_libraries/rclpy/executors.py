@@ -29,7 +29,7 @@ from volery.ros.client_libraries.rclpy.context import (
     ShutdownException,
     TimeoutException,
 )
-from volery.ros.graph import Group, Work
+from volery.ros.graph import ReadyCallbacks, Work
 
 Run = Callable[[], None]
 
@@ -107,7 +107,7 @@ class ReentrantCallbackGroup(CallbackGroup):
 class CallbackQueue:
     """Ready callbacks of one group of one node."""
 
-    def __init__(self, group: CallbackGroup, ready: Group) -> None:
+    def __init__(self, group: CallbackGroup, ready: ReadyCallbacks) -> None:
         self.group, self.ready = group, ready
         self._entities: list[Any] = []
 

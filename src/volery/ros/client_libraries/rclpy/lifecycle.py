@@ -195,11 +195,11 @@ class LifecycleNode(Node, ManagedEntity):
 
     def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Any:
         """Create a publisher that publishes only while the node is active."""
-        made = self.create_publisher(
+        publisher = self.create_publisher(
             msg_type, topic, qos_profile, publisher_class=LifecyclePublisher, **options
         )
-        self._managed.append(made)
-        return made
+        self._managed.append(publisher)
+        return publisher
 
     def destroy_lifecycle_publisher(self, publisher: LifecyclePublisher) -> bool:
         """Destroy a lifecycle publisher."""
@@ -332,7 +332,10 @@ class LifecycleNode(Node, ManagedEntity):
 
 
 def _describe_all(transitions: list[_Transition]) -> list[Any]:
-    return [_fill_transition(new("lifecycle_msgs/msg/TransitionDescription"), one) for one in transitions]
+    return [
+        _fill_transition(new("lifecycle_msgs/msg/TransitionDescription"), transition)
+        for transition in transitions
+    ]
 
 
 def _fill_transition(message: Any, by: _Transition) -> Any:

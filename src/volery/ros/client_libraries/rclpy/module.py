@@ -129,7 +129,7 @@ def _chosen(content: Mapping[str, Any], *names: str) -> dict[str, Any]:
 
 
 def _named(*members: Any) -> dict[str, Any]:
-    return {one.__name__: one for one in members}
+    return {member.__name__: member for member in members}
 
 
 def _submodules_of_all_runs() -> dict[str, dict[str, Any]]:
@@ -233,7 +233,7 @@ def _functions(contexts: Contexts, bound: Mapping[str, Any]) -> dict[str, Callab
     of_contexts: tuple[Any, ...] = (init, shutdown, try_shutdown, ok, get_default_context)
     of_executor: tuple[Any, ...] = (spin, spin_once, spin_until_future_complete, get_global_executor)
     return {
-        **{one.__name__: partial(one, contexts) for one in of_contexts},
+        **{context.__name__: partial(context, contexts) for context in of_contexts},
         **{one.__name__: partial(one, global_executor) for one in of_executor},
         "create_node": bound["Node"],
     }
@@ -373,13 +373,13 @@ def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
     A section of them is from ``--ros-args`` to ``--`` or the end; old remappings stand alone.
     """
     kept, inside = [], False
-    for one in args if args is not None else sys.argv:
+    for arg in args if args is not None else sys.argv:
         if inside:
-            inside = one != "--"
-        elif one == "--ros-args":
+            inside = arg != "--"
+        elif arg == "--ros-args":
             inside = True
-        elif ":=" not in one:
-            kept.append(one)
+        elif ":=" not in arg:
+            kept.append(arg)
     return kept
 
 

@@ -82,10 +82,10 @@ def _check(
     name: str, rules: tuple[_Rule, ...], kind: type[NameValidationException], called: str, words: str
 ) -> bool:
     for rule in rules:
-        found = rule.forbidden.search(name) if name.isascii() else re.search(r"[^\x00-\x7f]", name)
-        if found:
+        match = rule.forbidden.search(name) if name.isascii() else re.search(r"[^\x00-\x7f]", name)
+        if match:
             text = f"{words} {rule.words if name.isascii() else rules[-1].words}"
-            raise kind(f"Invalid {called}: {text}:\n  {name!r}\n   {' ' * found.start()}^")
+            raise kind(f"Invalid {called}: {text}:\n  {name!r}\n   {' ' * match.start()}^")
     return True
 
 
@@ -160,7 +160,7 @@ def topic_or_service_is_hidden(name: str) -> bool:
 
 
 def _module(*functions: Callable[..., Any]) -> dict[str, dict[str, Any]]:
-    return {one.__name__: {one.__name__: one} for one in functions}
+    return {function.__name__: {function.__name__: function} for function in functions}
 
 
 NAMES: dict[str, dict[str, Any]] = _module(

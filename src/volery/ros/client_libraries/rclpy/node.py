@@ -112,8 +112,8 @@ class Node(NodeParameters):
         return response
 
     def _set_logger_levels(self, request: Any, response: Any) -> Any:
-        for one in request.levels:
-            self.contexts.levels[one.name] = one.level
+        for level in request.levels:
+            self.contexts.levels[level.name] = level.level
             response.results.append(new("rcl_interfaces/msg/SetLoggerLevelsResult", successful=True))
         return response
 
@@ -375,14 +375,14 @@ class Node(NodeParameters):
 
     def destroy_node(self) -> None:
         """Destroy all entities of the node and leave the graph."""
-        for made in tuple(self._entities):
-            self._destroy(made)
+        for entity in tuple(self._entities):
+            self._destroy(entity)
         if self._executor is not None:
             self._executor.remove_node(self)
         self._context.close_graph_node(self.graph_node)
 
     def _entities_of(self, kind: type) -> list[Any]:
-        return [made for made in self._entities if isinstance(made, kind)]
+        return [entity for entity in self._entities if isinstance(entity, kind)]
 
     @property
     def publishers(self) -> list[Publisher]:
@@ -449,12 +449,12 @@ class Node(NodeParameters):
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:
         """Return all topics with a publisher or a subscription."""
         with self._context.kernel.interact():
-            return [(one.name, [one.type]) for one in self.contexts.graph.topics()]
+            return [(topic.name, [topic.type]) for topic in self.contexts.graph.topics()]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Return all services that have a server."""
         with self._context.kernel.interact():
-            return [(one.name, [one.type]) for one in self.contexts.graph.services()]
+            return [(service.name, [service.type]) for service in self.contexts.graph.services()]
 
     def _named(self, node_name: str, node_namespace: str) -> str:
         full = f"{node_namespace.rstrip('/')}/{node_name}"
@@ -486,7 +486,11 @@ class Node(NodeParameters):
         """Return the services that a node serves."""
         with self._context.kernel.interact():
             full = self._named(node_name, node_namespace)
-            return [(one.name, [one.type]) for one in self.contexts.graph.services() if one.server == full]
+            return [
+                (service.name, [service.type])
+                for service in self.contexts.graph.services()
+                if service.server == full
+            ]
 
     def get_client_names_and_types_by_node(self, node_name: str, node_namespace: str) -> Any:
         """Refuse: the embedded graph does not keep clients."""
@@ -539,7 +543,7 @@ class Node(NodeParameters):
         """Return the number of servers of a service."""
         full = self.resolve_service_name(service_name)
         with self._context.kernel.interact():
-            return sum(1 for one in self.contexts.graph.services() if one.name == full)
+            return sum(1 for service in self.contexts.graph.services() if service.name == full)
 
     def count_clients(self, service_name: str) -> int:
         """Refuse: the embedded graph does not keep clients."""
@@ -550,7 +554,9 @@ class Node(NodeParameters):
     def _count(self, topic_name: str, side: str) -> int:
         full = self.resolve_topic_name(topic_name)
         with self._context.kernel.interact():
-            return sum(len(getattr(one, side)) for one in self.contexts.graph.topics() if one.name == full)
+            return sum(
+                len(getattr(topic, side)) for topic in self.contexts.graph.topics() if topic.name == full
+            )
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
         """Block until there is a node of this name; return False after *timeout* s."""

@@ -201,7 +201,7 @@ class DeclaredParameters:
         self._node = node
         self._changed = changed
         self._undeclared_allowed = undeclared_allowed
-        self._overrides = {one.name: one.value for one in overrides}
+        self._overrides = {override.name: override.value for override in overrides}
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Any] = {}
         self.before: list[Callable[[list[Parameter]], list[Parameter]]] = []
@@ -271,10 +271,10 @@ class DeclaredParameters:
             return self._overrides[name]
         if not self._node.has_parameter(private):
             return default
-        found = self._node.get_parameter(private)
-        if isinstance(found, dict):
+        parameter = self._node.get_parameter(private)
+        if isinstance(parameter, dict):
             return default  # others are below this name
-        return list(found) if isinstance(found, tuple) else found
+        return list(parameter) if isinstance(parameter, tuple) else parameter
 
     def _keep(self, parameter: Parameter) -> None:
         self._parameters[parameter.name] = parameter
@@ -291,14 +291,14 @@ class DeclaredParameters:
 
     def get(self, name: str) -> Parameter:
         """Return the current value of a parameter."""
-        found = self._parameters.get(name)
-        if found is None:
+        parameter = self._parameters.get(name)
+        if parameter is None:
             if self._undeclared_allowed:
                 return Parameter(name)
             raise ParameterNotDeclaredException(name)
-        if found.value is None and self._descriptors[name].type:
+        if parameter.value is None and self._descriptors[name].type:
             raise ParameterUninitializedException(name)
-        return found
+        return parameter
 
     def descriptor(self, name: str) -> Any:
         """Return the descriptor of a parameter."""
@@ -338,7 +338,7 @@ class DeclaredParameters:
             parameters = prepare(list(parameters))
             if not parameters:
                 return new(_RESULT, successful=False, reason="parameter list was modified to be empty")
-        unknown = [one.name for one in parameters if one.name not in self._parameters]
+        unknown = [parameter.name for parameter in parameters if parameter.name not in self._parameters]
         if unknown and not self._undeclared_allowed:
             raise ParameterNotDeclaredException(unknown)
         refusal = self._refusal(list(parameters))
@@ -354,10 +354,12 @@ class DeclaredParameters:
         return new(_RESULT, successful=True)
 
     def _refusal(self, parameters: list[Parameter]) -> str:
-        for one in parameters:
-            if one.name in self._descriptors:
-                declared = one.name in self._parameters
-                violation = constraint_violation(one, self._descriptors[one.name], declared=declared)
+        for parameter in parameters:
+            if parameter.name in self._descriptors:
+                declared = parameter.name in self._parameters
+                violation = constraint_violation(
+                    parameter, self._descriptors[parameter.name], declared=declared
+                )
                 if violation:
                     return violation
         for validator in self.validators:
@@ -529,7 +531,7 @@ def _list(node: NodeParameters, request: Any, response: Any) -> None:
 
 
 def _set(node: NodeParameters, request: Any, response: Any) -> None:
-    response.results = [_set_messages(node, [one]) for one in request.parameters]
+    response.results = [_set_messages(node, [parameter]) for parameter in request.parameters]
 
 
 def _set_atomically(node: NodeParameters, request: Any, response: Any) -> None:
@@ -538,7 +540,7 @@ def _set_atomically(node: NodeParameters, request: Any, response: Any) -> None:
 
 def _set_messages(node: NodeParameters, messages: list[Any]) -> Any:
     try:
-        return node.set_parameters_atomically([Parameter.from_parameter_msg(one) for one in messages])
+        return node.set_parameters_atomically([Parameter.from_parameter_msg(message) for message in messages])
     except ParameterNotDeclaredException as error:
         return new("rcl_interfaces/msg/SetParametersResult", successful=False, reason=str(error))
 

@@ -121,15 +121,15 @@ class AsyncParameterClient:
 
     def services_are_ready(self) -> bool:
         """Return whether the other node serves its parameters."""
-        return all(one.service_is_ready() for one in self._clients.values())
+        return all(client.service_is_ready() for client in self._clients.values())
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
         """Block until the other node serves its parameters; return False after a time-out."""
         kernel = self.node.context.kernel
         until = None if timeout_sec is None else kernel.now() + from_seconds(timeout_sec)
-        for one in self._clients.values():
+        for client in self._clients.values():
             left = None if until is None else max(0, until - kernel.now()) / 1e9
-            if not one.wait_for_service(left):
+            if not client.wait_for_service(left):
                 return False
         return True
 
@@ -195,7 +195,10 @@ class AsyncParameterClient:
 
 
 def _messages(parameters: Sequence[Any]) -> list[Any]:
-    return [one.to_parameter_msg() if isinstance(one, Parameter) else one for one in parameters]
+    return [
+        parameter.to_parameter_msg() if isinstance(parameter, Parameter) else parameter
+        for parameter in parameters
+    ]
 
 
 def _on_events(node: Node, callback: Callable[[Any], Any], qos_profile: Any, options: dict[str, Any]) -> Any:
@@ -263,15 +266,15 @@ class ParameterEventHandler:
         self, parameter_name: str, node_name: str, callback: Callable[[Any], Any]
     ) -> ParameterCallbackHandle:
         """Call *callback* with each new value of a parameter of a node; "" is this node."""
-        made = ParameterCallbackHandle(parameter_name, self._full(node_name), callback)
-        self._one.insert(0, made)
-        return made
+        handle = ParameterCallbackHandle(parameter_name, self._full(node_name), callback)
+        self._one.insert(0, handle)
+        return handle
 
     def add_parameter_event_callback(self, callback: Callable[[Any], Any]) -> ParameterEventCallbackHandle:
         """Call *callback* with each event."""
-        made = ParameterEventCallbackHandle(callback)
-        self._all.insert(0, made)
-        return made
+        handle = ParameterEventCallbackHandle(callback)
+        self._all.insert(0, handle)
+        return handle
 
     def remove_parameter_callback(self, handle: ParameterCallbackHandle) -> None:
         """Remove a callback; raise ``ValueError`` if it was not added."""

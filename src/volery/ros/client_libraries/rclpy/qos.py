@@ -172,7 +172,7 @@ class QoSProfile:
 
     def __str__(self) -> str:
         values = (getattr(self, name) for name in _POLICIES)
-        texts = (str(one if isinstance(one, (bool, Duration)) else int(one)) for one in values)
+        texts = (str(value if isinstance(value, (bool, Duration)) else int(value)) for value in values)
         inside = ", ".join(f"{name}={text}" for name, text in zip(_POLICIES, texts, strict=True))
         return f"QoSProfile({inside})"
 

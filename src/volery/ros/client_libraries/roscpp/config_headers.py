@@ -75,7 +75,9 @@ def _parameters(tree: ast.Module, file: Path) -> Iterator[_Parameter]:
     }
     calls = sorted(_calls(tree, "add"), key=lambda call: call.lineno)
     for call in calls:
-        given = dict(zip(names, call.args, strict=False)) | {one.arg: one.value for one in call.keywords}
+        given = dict(zip(names, call.args, strict=False)) | {
+            keyword.arg: keyword.value for keyword in call.keywords
+        }
         values = {}
         for name, node in given.items():
             if name == "edit_method" or name is None:
@@ -132,8 +134,10 @@ def _cpp(value: Any, kind: str, otherwise: str) -> str:
 
 
 def _header(package: str, name: str, parameters: list[_Parameter]) -> str:
-    members = "\n".join(f"    {one.cpp} {one.name} = {one.default};" for one in parameters)
-    visits = "\n".join(_visit(f"&{name}Config::{one.name}", one) for one in parameters)
+    members = "\n".join(
+        f"    {parameter.cpp} {parameter.name} = {parameter.default};" for parameter in parameters
+    )
+    visits = "\n".join(_visit(f"&{name}Config::{parameter.name}", parameter) for parameter in parameters)
     return _TEXT.format(package=package, name=name, members=members, visits=visits)
 
 

@@ -17,7 +17,7 @@ from volery.ros.client_libraries.cpp.message_structs import (
     with_ours,
 )
 from volery.ros.client_libraries.roscpp.config_headers import config_header
-from volery.ros.messages.encodings import FieldLayout, Layout, ros1_layout
+from volery.ros.messages.encodings import FieldLayout, MessageLayout, ros1_layout
 from volery.ros.messages.store import ROS1_SPELLING, define_ros1_action
 
 INCLUDE = Path(__file__).parent / "include"
@@ -149,8 +149,10 @@ struct {label} {{
 """
 
 
-def _add_message(texts: dict[str, str], package: str, label: str, layout: Layout) -> None:
-    nested = dict.fromkeys(one.nested for one in layout.fields if one.nested and one.nested not in _TIMES)
+def _add_message(texts: dict[str, str], package: str, label: str, layout: MessageLayout) -> None:
+    nested = dict.fromkeys(
+        field.nested for field in layout.fields if field.nested and field.nested not in _TIMES
+    )
     texts[f"{package}/{label}.h"] = message_header(package, label, layout)
     for name in nested:
         inner_package, _, inner = _ros1(name).partition("/")
@@ -161,9 +163,11 @@ def _ros1(name: str) -> str:
     return ros1_layout(name).label
 
 
-def message_header(package: str, label: str, layout: Layout) -> str:
+def message_header(package: str, label: str, layout: MessageLayout) -> str:
     """Return the text of ``package/label.h``."""
-    nested = dict.fromkeys(one.nested for one in layout.fields if one.nested and one.nested not in _TIMES)
+    nested = dict.fromkeys(
+        field.nested for field in layout.fields if field.nested and field.nested not in _TIMES
+    )
     lines = [
         f"// Generated from the definition of {layout.label}.",
         "#pragma once",
@@ -174,7 +178,7 @@ def message_header(package: str, label: str, layout: Layout) -> str:
     lines += [f"    using Ptr = boost::shared_ptr<{label}>;"]
     lines += [f"    using ConstPtr = boost::shared_ptr<{label} const>;"]
     lines += constant_lines(layout, BASES.__getitem__)
-    lines += [f"    {_type(one)} {one.name}{{}};" for one in layout.fields]
+    lines += [f"    {_type(field)} {field.name}{{}};" for field in layout.fields]
     lines += [*visit_lines(layout), "};", ""]
     lines += [f"using {label}Ptr = {label}::Ptr;", f"using {label}ConstPtr = {label}::ConstPtr;", ""]
     lines += [f"using ros::message_operators::operator{one};" for one in ("<<", "==", "!=")]

@@ -12,7 +12,7 @@ from volery.ros.client_libraries.cpp.requests import CdrPublisher, Simple, WithF
 from volery.ros.client_libraries.cpp.requests import request_handlers as shared_handlers
 from volery.ros.client_libraries.cpp.session import RefusedRequestError
 from volery.ros.client_libraries.roscpp.session import Session
-from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, Group, QoS, ServiceError, Timer
+from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, QoS, ReadyCallbacks, ServiceError, Timer
 from volery.ros.graph.endpoints import Connection, EmbeddedPublisher
 from volery.ros.graph.work import Work
 from volery.ros.messages import from_cdr, service, to_cdr
@@ -132,7 +132,9 @@ def _wait_for_service(session: Session, arguments: Reader) -> bool:
 class _Timer:
     """A ``ros::Timer``, which calls the callable numbered *callback* each *period*, or once."""
 
-    def __init__(self, session: Session, period: Ns, callback: int, group: Group, *, oneshot: bool) -> None:
+    def __init__(
+        self, session: Session, period: Ns, callback: int, group: ReadyCallbacks, *, oneshot: bool
+    ) -> None:
         if period <= 0:
             raise UsageError(
                 f"{session.component}: a ros::Timer with a period of {period} ns; it must be above 0"
@@ -203,7 +205,7 @@ def _find_timer(session: Session, arguments: Reader) -> _Timer:
 class _Spinner:
     """Tasks that run the callbacks of a queue until they are stopped or the node shuts down."""
 
-    def __init__(self, session: Session, group: Group) -> None:
+    def __init__(self, session: Session, group: ReadyCallbacks) -> None:
         self._session, self._group = session, group
         self._spinning = 0
         self._stopped = False
@@ -221,14 +223,14 @@ class _Spinner:
             self._group.add(Work(self._session.kernel.now(), lambda: None))
 
 
-def _call_available(group: Group, timeout: Ns) -> bool:
+def _call_available(group: ReadyCallbacks, timeout: Ns) -> bool:
     """Run all callbacks that are ready, the first of which is awaited."""
     if timeout <= 0 or group.oldest is not None or group.spin_once(timeout):
         group.spin_available()
     return True
 
 
-def _queue_call(how: Callable[[Group, Ns], bool]) -> Callable[[Session, CppFiber, Reader], bool]:
+def _queue_call(how: Callable[[ReadyCallbacks, Ns], bool]) -> Callable[[Session, CppFiber, Reader], bool]:
     def handle(session: Session, fiber: CppFiber, arguments: Reader) -> bool:
         group, timeout = session.group(arguments.integer()), arguments.integer()
         called: list[bool] = []

@@ -19,7 +19,7 @@ from volery.ros.client_libraries.rospy.session import (
 )
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription, Work
 from volery.ros.graph.endpoints import EmbeddedPublisher
-from volery.ros.messages import Message, ros1_type, to_cdr, to_ros1
+from volery.ros.messages import RosMessage, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.client_classes import SerializationError, adopt, library_of, receiving
 from volery.ros.messages.encodings import ros1_name
 from volery.trace.events import WARNING
@@ -42,7 +42,7 @@ class AnyMsg:
         self._connection_header: dict[str, Any] | None = None
 
     @classmethod
-    def of(cls, message: Message, topic: str) -> AnyMsg:
+    def of(cls, message: RosMessage, topic: str) -> AnyMsg:
         """Return a received message."""
         kind, made = ros1_type(message.__msgtype__), cls()
         made._buff = to_ros1(message)
@@ -85,7 +85,9 @@ class AnySubscription:
     def _subscribe_when_known(self) -> None:
         node = self._session.node
         while self._open and not node.closed:
-            kind = next((one.type for one in self._session.graph.topics() if one.name == self.topic), "")
+            kind = next(
+                (topic.type for topic in self._session.graph.topics() if topic.name == self.topic), ""
+            )
             if kind:
                 group = self._session.spinning_group(self.topic, f"callback of {self.topic}")
                 self._made = node.subscribe(self.topic, kind, self._call, self._qos, group)
@@ -229,7 +231,7 @@ class Publisher:
         self._publisher.close()
 
 
-def _misfits(message: Message) -> bool:
+def _misfits(message: RosMessage) -> bool:
     """Return whether a message has a value that does not fit its field."""
     try:
         to_cdr(message)
@@ -402,7 +404,7 @@ def _to_response(service_class: Any, given: Any) -> Any:
     A handler may return a response, its only field, its fields in order, or a dict of them.
     """
     kind = service_class._response_class
-    if isinstance(given, Message):
+    if isinstance(given, RosMessage):
         return given
     if isinstance(given, dict):
         return kind(**given)
@@ -458,7 +460,7 @@ class ServiceProxy:
     def _header(self) -> dict[str, Any]:
         """Return the header of the connection to the server, as ROS 1 has it."""
         services = self._session.graph.services()
-        server = next((one.server for one in services if one.name == self.resolved_name), "")
+        server = next((service.server for service in services if service.name == self.resolved_name), "")
         return _service_header(server, self.service_class)
 
     def wait_for_service(self, timeout: Any = None) -> None:

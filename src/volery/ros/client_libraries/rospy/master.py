@@ -47,23 +47,25 @@ class Master:
             graph = self.sessions.graph
             topics, services = graph.topics(), graph.services()
         return [
-            [[one.name, list(one.publishers)] for one in topics if one.publishers],
-            [[one.name, list(one.subscribers)] for one in topics if one.subscribers],
-            [[one.name, [one.server]] for one in services],
+            [[topic.name, list(topic.publishers)] for topic in topics if topic.publishers],
+            [[topic.name, list(topic.subscribers)] for topic in topics if topic.subscribers],
+            [[service.name, [service.server]] for service in services],
         ]
 
     def getTopicTypes(self) -> list[list[str]]:  # noqa: N802 - rosgraph's name
         """Return the topics with their types."""
         with self.sessions.kernel.interact():
             topics = self.sessions.graph.topics()
-        return [[one.name, one.type.replace("/msg/", "/")] for one in topics]
+        return [[topic.name, topic.type.replace("/msg/", "/")] for topic in topics]
 
     def getPublishedTopics(self, subgraph: str = "") -> list[list[str]]:  # noqa: N802 - rosgraph's name
         """Return the published topics below a namespace with their types."""
         with self.sessions.kernel.interact():
-            topics = [one for one in self.sessions.graph.topics() if one.publishers]
+            topics = [topic for topic in self.sessions.graph.topics() if topic.publishers]
         below = subgraph.rstrip("/") + "/"
-        return [[one.name, one.type.replace("/msg/", "/")] for one in topics if one.name.startswith(below)]
+        return [
+            [topic.name, topic.type.replace("/msg/", "/")] for topic in topics if topic.name.startswith(below)
+        ]
 
     def hasParam(self, key: str) -> bool:  # noqa: N802 - rosgraph's name
         """Return whether a parameter exists."""

@@ -256,7 +256,7 @@ def modules(
     names["Duration"] = Duration
     names["TimerEvent"] = TimerEvent
     names["Header"] = message_of("std_msgs/msg/Header", ROSPY)
-    names["Message"] = messages.Message
+    names["Message"] = messages.RosMessage
     names["AnyMsg"] = entities.AnyMsg
     names["SubscribeListener"] = entities.SubscribeListener
     masters = master_names(sessions)
@@ -463,9 +463,11 @@ def is_wallclock(sessions: Sessions) -> bool:
 def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:
     """Return the published topics below *namespace* with their types as spelled in ROS 1."""
     with sessions.kernel.interact():
-        states = [one for one in sessions.graph.topics() if one.publishers]
+        states = [topic for topic in sessions.graph.topics() if topic.publishers]
     below = namespace.rstrip("/") + "/"
-    return [[one.name, one.type.replace("/msg/", "/")] for one in states if one.name.startswith(below)]
+    return [
+        [state.name, state.type.replace("/msg/", "/")] for state in states if state.name.startswith(below)
+    ]
 
 
 def myargv(sessions: Sessions, argv: Sequence[str] | None = None) -> list[str]:

@@ -19,7 +19,7 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Cancelled, Scope
 from volery.kernel.waiting import Signal, current_task, poll, read_clock
 from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout, node_of_file
-from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
+from volery.ros.graph import LATCHED, Node, ReadyCallbacks, RosGraph, Work
 from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.ros.messages.message import nanoseconds
 from volery.trace.events import ERROR, WARNING, Failure, Text
@@ -137,7 +137,7 @@ class Session:
         """Block until the node shuts down."""
         self.ended.wait_for(lambda: self.shutdown, ends_activation=True)
 
-    def spinning_group(self, label: str, what: str) -> Group:
+    def spinning_group(self, label: str, what: str) -> ReadyCallbacks:
         """Return a new group that a helper task spins, as a thread of rospy would.
 
         Args:
@@ -157,7 +157,7 @@ class Session:
         """Run *body* in a helper task, as a thread of rospy would."""
         self._spawn(lambda: self._guarded(body, label), label)
 
-    def spawning_group(self, label: str, what: str) -> Group:
+    def spawning_group(self, label: str, what: str) -> ReadyCallbacks:
         """Return a new group that runs each piece of work in a task of its own."""
 
         def start(work: Work) -> None:

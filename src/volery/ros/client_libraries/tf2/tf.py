@@ -386,8 +386,8 @@ def scale_matrix(factor: float) -> Any:
 def concatenate_matrices(*matrices: Any) -> Any:
     """Return the product of matrices."""
     made = np.eye(4)
-    for one in matrices:
-        made = made @ one
+    for matrix in matrices:
+        made = made @ matrix
     return made
 
 

@@ -111,9 +111,9 @@ class TransformRegistration:
 
     def get(self, key: Any) -> Any:
         """Return the function of a class; raise ``TypeException`` if there is none."""
-        found = self._functions.get(key)
-        if found is not None:
-            return found
+        function = self._functions.get(key)
+        if function is not None:
+            return function
         name = getattr(key, "__msgtype__", "")
         if name not in _KINDS:
             named = name or getattr(key, "__name__", key)
@@ -369,10 +369,10 @@ class Buffer:
     ) -> Any:
         """Return a stamped object in another frame at another time, via a fixed frame."""
         change, header = _conversion_of(object_stamped, new_type), object_stamped.header
-        found = self.lookup_transform_full(
+        full = self.lookup_transform_full(
             target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
         )
-        return change(object_stamped, found)
+        return change(object_stamped, full)
 
     def can_transform_full(  # noqa: PLR0917 - tf2's
         self,

@@ -141,7 +141,7 @@ def environment(uri: str) -> dict[str, str]:
     """Return the environment of a ROS program of the master at `uri`, without this virtual environment."""
     kept = {key: value for key, value in os.environ.items() if key not in ("VIRTUAL_ENV", "PYTHONPATH")}
     ours = str(Path(sys.executable).parent)
-    path = [one for one in kept.get("PATH", "").split(os.pathsep) if one and one != ours]
+    path = [word for word in kept.get("PATH", "").split(os.pathsep) if word and word != ours]
     return {**kept, "PATH": os.pathsep.join(path), "ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1"}
 
 
@@ -268,5 +268,5 @@ def _descendants(pid: int) -> list[int]:
     children: list[int] = []
     for listed in Path(f"/proc/{pid}/task").glob("*/children"):
         with suppress(OSError):
-            children += [int(one) for one in listed.read_text().split()]
+            children += [int(word) for word in listed.read_text().split()]
     return [*children, *(deeper for child in children for deeper in _descendants(child))]

@@ -100,7 +100,7 @@ def _raw_base() -> Any:
     """Return the base of all raw classes; created on demand, since genpy may not be installed."""
     genpy = import_module("genpy")
 
-    class RawMessage(genpy.Message):  # type: ignore[misc,name-defined]  # genpy carries no types
+    class SerializedMessage(genpy.Message):  # type: ignore[misc,name-defined]  # genpy carries no types
         """A message as ROS 1 bytes under its type's name."""
 
         __slots__ = ["data"]
@@ -119,7 +119,7 @@ def _raw_base() -> Any:
             self.data = bytes(data)
             return self
 
-    return RawMessage
+    return SerializedMessage
 
 
 def _made(kind: Ros1Type) -> Any:

@@ -28,7 +28,7 @@ from volery.ros.graph.interface import (
     full_node_name,
     join_names,
 )
-from volery.ros.messages import Message, ServiceType, from_ros1, ros1_service, ros1_type, to_ros1
+from volery.ros.messages import RosMessage, ServiceType, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.ros.messages.encodings import cdr_to_ros1, our_name
 from volery.ros.transports.client_library import OnMessage, OnRequest, OnResponse, ReceivedMessage
 from volery.ros.transports.ros1.master import (
@@ -122,9 +122,9 @@ class Ros1ServiceServer:
 
         def handle(request: Any) -> Any:
             ended = threading.Event()
-            outcome: list[tuple[Message | None, str]] = []
+            outcome: list[tuple[RosMessage | None, str]] = []
 
-            def done(answer: Message | None, problem: str) -> None:
+            def done(answer: RosMessage | None, problem: str) -> None:
                 outcome.append((answer, problem))
                 ended.set()
 
@@ -153,7 +153,7 @@ class Ros1ServiceClient:
         self._class = raw_service_class(kind)
         self._answer = kind.response.__msgtype__
 
-    def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
+    def call(self, request: RosMessage, done: OnResponse) -> Callable[[], None]:
         """Send the request in a thread of its own; abandoning the call closes its connection."""
         proxy = self._rospy.ServiceProxy(self._name, self._class)
         wanted = self._class._request_class(to_ros1(request))
@@ -387,10 +387,10 @@ class Ros1Library:
 
     def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros1Node:
         """Create and register a node."""
-        made = Ros1Node(self._types, name, namespace, lost)
+        node = Ros1Node(self._types, name, namespace, lost)
         with self._guard:
-            self._wires.append(made)
-        return made
+            self._wires.append(node)
+        return node
 
     def _watch(self) -> None:
         there = True
@@ -492,10 +492,10 @@ def ros1_graph(
         else:
             Master(uri, "/volery").value("getPid")
     library = Ros1Library(Master(uri, "/volery"), core)
-    made = TransportGraph(kernel, library, records=records, epoch=epoch)
-    library.say = made.warn
+    graph = TransportGraph(kernel, library, records=records, epoch=epoch)
+    library.say = graph.warn
     library.start()
-    return made
+    return graph
 
 
 _claimed: list[str] = []

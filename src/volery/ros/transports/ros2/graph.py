@@ -83,9 +83,9 @@ class Ros2Node:
 
     def serve(self, name: str, kind: ServiceType, requested: OnRequest) -> Ros2ServiceServer:
         """Offer a service; raise ``UsageError`` if another node does."""
-        for one in self._library.services():
-            if one.name == name:
-                raise UsageError(f"node {self.name}: service {name} is served by {one.server} already")
+        for service in self._library.services():
+            if service.name == name:
+                raise UsageError(f"node {self.name}: service {name} is served by {service.server} already")
         return Ros2ServiceServer(self._node, name, kind, requested)
 
     def client(self, name: str, kind: ServiceType) -> Ros2ServiceClient:
@@ -188,10 +188,10 @@ class Ros2Library:
         for name, kinds in self._own.get_topic_names_and_types():
             if len(kinds) > 1 and name not in self._warned:
                 ends = self._endpoints(name)
-                if any(one.node_name == NOT_KNOWN_YET for one in ends):
+                if any(end.node_name == NOT_KNOWN_YET for end in ends):
                     continue  # the next look has the node's name
                 self._warned.add(name)
-                by_type = {kind: _users([one for one in ends if one.topic_type == kind]) for kind in kinds}
+                by_type = {kind: _users([end for end in ends if end.topic_type == kind]) for kind in kinds}
                 listed = "; ".join(f"{kind} of {', '.join(who)}" for kind, who in sorted(by_type.items()))
                 self.say(
                     f"{name} carries several types; nodes of different types are not connected: {listed}"
@@ -248,9 +248,9 @@ class Ros2Library:
             return
         time.sleep(max(0.0, self._began + DISCOVERY_S - time.monotonic()))
         while time.monotonic() < self._began + DISCOVERY_LIMIT_S and any(
-            one.node_name == NOT_KNOWN_YET
+            endpoint.node_name == NOT_KNOWN_YET
             for topic, _ in self._own.get_topic_names_and_types()
-            for one in self._endpoints(topic)
+            for endpoint in self._endpoints(topic)
         ):
             time.sleep(POLL_S)
         self._discovered = True
@@ -309,7 +309,7 @@ class Ros2Library:
 
 def _users(ends: list[Any]) -> tuple[str, ...]:
     users = {
-        join_names(one.node_namespace, one.node_name) for one in ends if not one.node_name.startswith(HIDDEN)
+        join_names(end.node_namespace, end.node_name) for end in ends if not end.node_name.startswith(HIDDEN)
     }
     return tuple(sorted(users))
 
@@ -333,6 +333,6 @@ def ros2_graph(
         UsageError: this Python finds no rclpy.
     """
     library = Ros2Library(domain)
-    made = TransportGraph(kernel, library, records=records, epoch=epoch)
-    library.say = made.warn
-    return made
+    graph = TransportGraph(kernel, library, records=records, epoch=epoch)
+    library.say = graph.warn
+    return graph

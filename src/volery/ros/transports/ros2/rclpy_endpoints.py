@@ -20,7 +20,7 @@ from typing import Any
 
 from volery.base.errors import LinkSilent, UsageError
 from volery.ros.graph.interface import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE, QoS
-from volery.ros.messages import Message, ServiceType, from_cdr
+from volery.ros.messages import RosMessage, ServiceType, from_cdr
 from volery.ros.transports.client_library import OnMessage, OnRequest, OnResponse, ReceivedMessage
 from volery.ros.transports.ros2.rclpy_types import from_rclpy, rclpy_class, rclpy_service, to_rclpy
 
@@ -101,10 +101,10 @@ class Ros2Subscription:
         offers = self._offers()
         reliability, durability = self._wanted.reliability, self._wanted.durability
         if reliability == BEST_AVAILABLE:
-            unreliable = any(one.reliability.name == "BEST_EFFORT" for one in offers)
+            unreliable = any(offer.reliability.name == "BEST_EFFORT" for offer in offers)
             reliability = BEST_EFFORT if unreliable else RELIABLE
         if durability == BEST_AVAILABLE:
-            kept = offers and all(one.durability.name == "TRANSIENT_LOCAL" for one in offers)
+            kept = offers and all(offer.durability.name == "TRANSIENT_LOCAL" for offer in offers)
             durability = TRANSIENT_LOCAL if kept else VOLATILE
         return replace(self._wanted, reliability=reliability, durability=durability)
 
@@ -171,7 +171,7 @@ class Ros2ServiceServer:
         async def handle(request: Any, response: Any) -> Any:
             answered = future_class(executor=node.executor)
 
-            def done(answer: Message | None, problem: str) -> None:
+            def done(answer: RosMessage | None, problem: str) -> None:
                 if not answered.done():
                     answered.set_result(answer)
                     node.executor.wake()  # the executor checks results only when it is woken
@@ -197,7 +197,7 @@ class Ros2ServiceClient:
         self._types = rclpy_service(kind)
         self._client = node.create_client(self._types.type, name, callback_group=own_group())
 
-    def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
+    def call(self, request: RosMessage, done: OnResponse) -> Callable[[], None]:
         """Send the request, if a server has been discovered; rclpy would wait for one without limit."""
         if not self._client.service_is_ready():
             done(None, "no node serves it")
@@ -230,9 +230,9 @@ class Ros2ServiceClient:
 def check_type(node: Any, topic: str, message_type: str, who: str) -> None:
     """Raise ``UsageError`` if the topic carries another type: DDS would leave the endpoints unconnected."""
     ends = (*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic))
-    others = [one for one in ends if one.topic_type != message_type]
+    others = [end for end in ends if end.topic_type != message_type]
     if others:
-        users = sorted({f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in others})
+        users = sorted({f"{other.node_namespace.rstrip('/')}/{other.node_name}" for other in others})
         raise UsageError(
             f"node {who}: topic {topic} carries {others[0].topic_type} "
             f"(of {', '.join(users)}), not {message_type}"

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
-from volery.ros.messages import Message, ServiceType, from_cdr, message_name, to_cdr, type_hash
+from volery.ros.messages import RosMessage, ServiceType, from_cdr, message_name, to_cdr, type_hash
 from volery.ros.messages.store import distribution, idl_fields, nested_types
 
 HEADERS = (
@@ -128,7 +128,7 @@ def _compiled() -> Path:
     """Return the path of the library for this installation, compiled unless the user's cache has it."""
     source = files("volery.ros.transports.ros2").joinpath("carrier.cpp").read_bytes()
     prefixes = _prefixes()
-    key = sha256(b"\0".join((source, *(str(one).encode() for one in prefixes)))).hexdigest()[:20]
+    key = sha256(b"\0".join((source, *(str(prefix).encode() for prefix in prefixes)))).hexdigest()[:20]
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "volery" / "ros2"
     made = folder / f"carrier-{key}.so"
     if not made.exists():
@@ -150,8 +150,8 @@ def _compile(source: bytes, prefixes: Sequence[Path], made: Path) -> None:
     compiler = shutil.which(os.environ.get("CXX", "g++"))
     if compiler is None:
         raise UsageError("there is no C++ compiler to build a carrier with: apt install g++")
-    includes = [f"-I{one / 'include' / inner}" for one in prefixes for inner in ("", *HEADERS)]
-    places = [f"-L{one / 'lib'}" for one in prefixes]
+    includes = [f"-I{prefix / 'include' / inner}" for prefix in prefixes for inner in ("", *HEADERS)]
+    places = [f"-L{prefix / 'lib'}" for prefix in prefixes]
     fresh = made.with_suffix(f".{os.getpid()}")  # renamed when complete: other processes may build it, too
     command = [compiler, "-std=c++17", "-O1", "-shared", "-fPIC", "-x", "c++", "-", "-o", str(fresh)]
     done = subprocess.run(
@@ -239,7 +239,7 @@ def rclpy_service(kind: ServiceType) -> RclpyService:
     return RclpyService(found, found.Request, found.Response)
 
 
-def to_rclpy(message: Message, cls: type[Any]) -> Any:
+def to_rclpy(message: RosMessage, cls: type[Any]) -> Any:
     """Convert a message to rclpy's class `cls`."""
     data = to_cdr(message)
     if is_raw_class(cls):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.mavlink.messages import Fields
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 ANALOGUE = 2
 """ARSPD_TYPE without a thermometer."""
@@ -20,30 +20,30 @@ SELF_HEATING = 25.0
 """Temperature of the sensor above that of the air in ArduPilot's simulator [degC] (SIM_Airspeed_DLVR)."""
 
 
-def is_there(vehicle: Vehicle) -> bool:
+def is_there(vehicle: AutopilotVehicle) -> bool:
     """Return whether the vehicle has an airspeed sensor."""
     return vehicle.parameters["ARSPD_ENABLE"] != 0.0 and vehicle.parameters["ARSPD_TYPE"] > 0.0
 
 
-def speed(vehicle: Vehicle) -> float | None:
+def speed(vehicle: AutopilotVehicle) -> float | None:
     """Return the airspeed [m/s], never negative; ``None`` without a sensor."""
     return max(0.0, vehicle.flight.air_from_ahead()) if is_there(vehicle) else None
 
 
-def temperature(vehicle: Vehicle) -> float | None:
+def temperature(vehicle: AutopilotVehicle) -> float | None:
     """Return the temperature at the sensor [degC]; ``None`` where none is measured."""
     if not is_there(vehicle) or vehicle.parameters["ARSPD_TYPE"] == ANALOGUE:
         return None
     return SEA_LEVEL_CELSIUS - LAPSE * vehicle.estimate.geodetic[2] + SELF_HEATING
 
 
-def _amend_hud(vehicle: Vehicle, hud: Fields) -> Fields:
+def _amend_hud(vehicle: AutopilotVehicle, hud: Fields) -> Fields:
     """Return VFR_HUD with the measured airspeed."""
     measured = speed(vehicle)
     return hud if measured is None else {**hud, "airspeed": measured}
 
 
-def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
+def _amend_status(vehicle: AutopilotVehicle, status: Fields) -> Fields:
     """Return SYS_STATUS with the sensor, if there is one; it is never enabled."""
     if not is_there(vehicle):
         return status
@@ -51,7 +51,7 @@ def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
     return {**status, **{name: status[name] | SENSOR for name in names}}
 
 
-def _amend_high_latency(vehicle: Vehicle, report: Fields) -> Fields:
+def _amend_high_latency(vehicle: AutopilotVehicle, report: Fields) -> Fields:
     """Return HIGH_LATENCY2 with the temperature."""
     celsius = temperature(vehicle)
     return report if celsius is None else {**report, "temperature_air": int(celsius)}

@@ -7,7 +7,7 @@ here emergency stop and motor interlock, both of which keep the motors from turn
 
 from __future__ import annotations
 
-from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Item, build_of
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Feature, MissionCommand, build_of
 from volery.simulation.autopilots.ardupilot.mission import mission_grew, path_jerk
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.pilot_input import HIGHEST, LOWEST, sticks_moved, switches_of
@@ -22,7 +22,7 @@ from volery.simulation.autopilots.onboard_mission import (
     MissionItem,
 )
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO, NOTICE
 
 UP, DOWN = 1800, 1200
@@ -36,7 +36,7 @@ LOWEST_TAKEOFF = 1.0
 """Least height of a take-off item that the pilot saves [m]."""
 
 
-def run_function(vehicle: Vehicle, function: int, position: int) -> bool:
+def run_function(vehicle: AutopilotVehicle, function: int, position: int) -> bool:
     """Do what a switch does at a position, and return whether the vehicle has that function."""
     build = build_of(vehicle)
     modes = build.mode_switches
@@ -56,7 +56,7 @@ def run_function(vehicle: Vehicle, function: int, position: int) -> bool:
     return True
 
 
-def read_switches(vehicle: Vehicle) -> None:
+def read_switches(vehicle: AutopilotVehicle) -> None:
     """Run the function of each channel whose switch has moved since it was last read."""
     options, at_once = switches_of(vehicle).options, build_of(vehicle).at_once
     for channel in range(FIRST_SWITCH, len(vehicle.rc.transmitter) + 1):
@@ -72,7 +72,7 @@ def read_switches(vehicle: Vehicle) -> None:
     update_stop(vehicle)
 
 
-def on_function(vehicle: Vehicle, command: Command) -> int:
+def on_function(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_AUX_FUNCTION: param1 is the function, param2 the position, 0 down to 2 up."""
     function, position = round(command.param1), round(command.param2)
     if position not in (0, 1, 2):
@@ -83,17 +83,17 @@ def on_function(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def act(vehicle: Vehicle, item: MissionItem) -> None:
+def act(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute the mission item DO_AUX_FUNCTION."""
     run_function(vehicle, round(item.param1), round(item.param2) - 1)
 
 
-def _uses(vehicle: Vehicle, function: int) -> bool:
+def _uses(vehicle: AutopilotVehicle, function: int) -> bool:
     channels = range(FIRST_SWITCH, len(vehicle.rc.transmitter) + 1)
     return any(round(vehicle.parameters[f"RC{channel}_OPTION"]) == function for channel in channels)
 
 
-def update_stop(vehicle: Vehicle) -> None:
+def update_stop(vehicle: AutopilotVehicle) -> None:
     """Compute whether emergency stop or interlock keep the motors from turning."""
     switches, arming = switches_of(vehicle), vehicle.arming
     open_ = vehicle.flies and not switches.interlock_closed and _uses(vehicle, INTERLOCK)
@@ -104,32 +104,32 @@ def update_stop(vehicle: Vehicle) -> None:
         arming.motors_stopped_at = vehicle.kernel.now()
 
 
-def _conflict(vehicle: Vehicle) -> bool:
+def _conflict(vehicle: AutopilotVehicle) -> bool:
     return vehicle.flies and _uses(vehicle, INTERLOCK) and _uses(vehicle, EMERGENCY_STOP)
 
 
-def _interlock_closed(vehicle: Vehicle) -> bool:
+def _interlock_closed(vehicle: AutopilotVehicle) -> bool:
     return vehicle.flies and switches_of(vehicle).interlock_closed and _uses(vehicle, INTERLOCK)
 
 
 STOP_CHECKS = (
-    Check("Motors Emergency Stopped", lambda vehicle: switches_of(vehicle).emergency_stop),
-    Check("Interlock/E-Stop Conflict", _conflict),
-    Check("Motor Interlock Enabled", _interlock_closed),
+    ArmingCheck("Motors Emergency Stopped", lambda vehicle: switches_of(vehicle).emergency_stop),
+    ArmingCheck("Interlock/E-Stop Conflict", _conflict),
+    ArmingCheck("Motor Interlock Enabled", _interlock_closed),
 )
 """Arming checks of the two functions; a vehicle is armed with an open interlock, which is closed then."""
 
 
-def _emergency_stop(vehicle: Vehicle, position: int) -> None:
+def _emergency_stop(vehicle: AutopilotVehicle, position: int) -> None:
     if position:
         switches_of(vehicle).emergency_stop = position > 0
 
 
-def _interlock(vehicle: Vehicle, position: int) -> None:
+def _interlock(vehicle: AutopilotVehicle, position: int) -> None:
     switches_of(vehicle).interlock_closed = position >= 0
 
 
-def _overrides(vehicle: Vehicle, position: int) -> None:
+def _overrides(vehicle: AutopilotVehicle, position: int) -> None:
     """Admit or deny the sticks of a ground station; denied ones go back to the transmitter at once."""
     if position:
         switches_of(vehicle).overrides_denied = position < 0
@@ -138,20 +138,20 @@ def _overrides(vehicle: Vehicle, position: int) -> None:
         sticks_moved(vehicle)
 
 
-def _clear_mission(vehicle: Vehicle, position: int) -> None:
+def _clear_mission(vehicle: AutopilotVehicle, position: int) -> None:
     """Delete the mission, except while it is flown."""
     if position > 0 and not (vehicle.armed and vehicle.mode.name == "AUTO"):
         vehicle.mission.clear()
         mission_grew(vehicle, 0)
 
 
-def _restart_mission(vehicle: Vehicle, position: int) -> None:
+def _restart_mission(vehicle: AutopilotVehicle, position: int) -> None:
     if position > 0:
         vehicle.mission.restart()
         vehicle.manoeuvre.item_chosen()
 
 
-def _save_waypoint(vehicle: Vehicle, position: int) -> None:
+def _save_waypoint(vehicle: AutopilotVehicle, position: int) -> None:
     """Append the present position to the mission; a disarmed rover clears the mission and sets home instead.
 
     The first item takes the place of home, item 0. A copter whose throttle is closed saves a landing.
@@ -175,7 +175,7 @@ def _save_waypoint(vehicle: Vehicle, position: int) -> None:
     mission_grew(vehicle, len(vehicle.mission))
 
 
-def _zigzag(vehicle: Vehicle, position: int) -> None:
+def _zigzag(vehicle: AutopilotVehicle, position: int) -> None:
     """Store point A (down) or B (up) of ZIGZAG or fly to its line; in the middle the pilot flies."""
     manoeuvre = vehicle.manoeuvre
     if not isinstance(manoeuvre, ZigZag):
@@ -186,7 +186,7 @@ def _zigzag(vehicle: Vehicle, position: int) -> None:
         manoeuvre.let_pilot_fly()
 
 
-def _item_here(vehicle: Vehicle, command: int) -> MissionItem:
+def _item_here(vehicle: AutopilotVehicle, command: int) -> MissionItem:
     latitude, longitude, amsl = vehicle.estimate.geodetic
     return MissionItem(command, GLOBAL, x=round(latitude * 1e7), y=round(longitude * 1e7), z=amsl)
 
@@ -197,7 +197,7 @@ COPTER = ROVER = Feature(
         for channel in range(FIRST_SWITCH, 17)
     },
     commands={DO_AUX_FUNCTION: on_function},
-    items={DO_AUX_FUNCTION: Item("AuxFunction", act, silent=True)},
+    items={DO_AUX_FUNCTION: MissionCommand("AuxFunction", act, silent=True)},
     switches={
         SAVE_WAYPOINT: _save_waypoint,
         RESTART_MISSION: _restart_mission,

@@ -19,12 +19,12 @@ from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
 from volery.simulation.autopilots.ardupilot.fence import CEILING, CIRCLE, POLYGON, fence_of
-from volery.simulation.autopilots.ardupilot.fence_shapes import Circle, Level, Shape, shapes
+from volery.simulation.autopilots.ardupilot.fence_shapes import FenceCircle, Level, Shape, shapes
 from volery.simulation.autopilots.ardupilot.proximity import closest, edges, is_healthy, proximity_of, upward
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 BY_FENCE, BY_PROXIMITY = 1, 2
 """Bits of AVOID_ENABLE."""
@@ -55,7 +55,7 @@ class AvoidanceState:
 avoidance_of = Kept(AvoidanceState)
 
 
-class Law(NamedTuple):
+class StoppingLaw(NamedTuple):
     """How a vehicle closes in on a limit.
 
     Args:
@@ -143,7 +143,7 @@ def _shortened(velocity: Level, most: float) -> Level:
 
 
 def _within_edges(
-    velocity: Level, place: Level, boundary: Iterable[tuple[Level, Level]], margin: float, law: Law
+    velocity: Level, place: Level, boundary: Iterable[tuple[Level, Level]], margin: float, law: StoppingLaw
 ) -> Level:
     """Limit a velocity before the edges of a polygon or of obstacles."""
     speed = hypot(*velocity)
@@ -160,7 +160,9 @@ def _within_edges(
     return velocity
 
 
-def _within_circle(velocity: Level, place: Level, circle: Circle, margin: float, law: Law) -> Level:
+def _within_circle(
+    velocity: Level, place: Level, circle: FenceCircle, margin: float, law: StoppingLaw
+) -> Level:
     """Limit a velocity inside or outside of a circle."""
     offset = (place[0] - circle.centre[0], place[1] - circle.centre[1])
     away, speed = hypot(*offset), hypot(*velocity)
@@ -199,7 +201,7 @@ def _to_circle(offset: Level, velocity: Level, radius: float) -> float:
 
 def _away_from(place: Level, shape: Shape) -> list[tuple[Level, float]]:
     """Return the vectors to the limits of a shape, and the distances to them."""
-    if isinstance(shape, Circle):
+    if isinstance(shape, FenceCircle):
         to_centre = (shape.centre[0] - place[0], shape.centre[1] - place[1])
         away = hypot(*to_centre)
         return [((-to_centre[0], -to_centre[1]) if shape.inside else to_centre, abs(shape.radius - away))]
@@ -207,13 +209,13 @@ def _away_from(place: Level, shape: Shape) -> list[tuple[Level, float]]:
     return [(vector, hypot(*vector)) for vector in vectors]
 
 
-def _fence_shapes(vehicle: Vehicle) -> list[Shape]:
+def _fence_shapes(vehicle: AutopilotVehicle) -> list[Shape]:
     """Return the shapes of the fence that limit: those that are not breached and have room for the margin."""
     parameters, home = vehicle.parameters, vehicle.home
     types = round(parameters["FENCE_TYPE"])
     found: list[Shape] = []
     if types & CIRCLE and home is not None and CIRCLE not in fence_of(vehicle).breached:
-        found.append(Circle((home.ned[0], home.ned[1]), parameters["FENCE_RADIUS"], True))
+        found.append(FenceCircle((home.ned[0], home.ned[1]), parameters["FENCE_RADIUS"], True))
     if types & POLYGON:
         found += shapes(vehicle)
     north, east, _ = vehicle.estimate.position
@@ -221,7 +223,7 @@ def _fence_shapes(vehicle: Vehicle) -> list[Shape]:
     return [
         shape
         for shape in found
-        if shape.admits((north, east)) and not (isinstance(shape, Circle) and shape.radius < margin)
+        if shape.admits((north, east)) and not (isinstance(shape, FenceCircle) and shape.radius < margin)
     ]
 
 
@@ -229,7 +231,7 @@ CREEPS = 0.04
 """Distance beyond the fence at which a velocity of GUIDED would end [m]: the copter creeps over the limit."""
 
 
-def _fence_margin(vehicle: Vehicle) -> float:
+def _fence_margin(vehicle: AutopilotVehicle) -> float:
     """Return the distance that avoidance keeps from the fence [m].
 
     Velocities of GUIDED do not keep FENCE_MARGIN: 6 m/s outwards from home cross a circle of 60 m after
@@ -240,24 +242,24 @@ def _fence_margin(vehicle: Vehicle) -> float:
     return max(0.0, vehicle.parameters["FENCE_MARGIN"])
 
 
-def _uses_fence(vehicle: Vehicle) -> bool:
+def _uses_fence(vehicle: AutopilotVehicle) -> bool:
     on = round(vehicle.parameters["AVOID_ENABLE"]) & BY_FENCE and vehicle.parameters["FENCE_ENABLE"]
     return bool(on) and vehicle.position_ok
 
 
-def _uses_proximity(vehicle: Vehicle) -> bool:
+def _uses_proximity(vehicle: AutopilotVehicle) -> bool:
     admitted = avoidance_of(vehicle).by_proximity and is_healthy(vehicle)
     return admitted and bool(round(vehicle.parameters["AVOID_ENABLE"]) & BY_PROXIMITY)
 
 
-def _is_low(vehicle: Vehicle) -> bool:
+def _is_low(vehicle: AutopilotVehicle) -> bool:
     """Return whether a copter is below AVOID_ALT_MIN by its rangefinder, where obstacles do not count."""
     parameters = vehicle.parameters
     height = vehicle.estimate.rangefinder if vehicle.flies and parameters["RNGFND1_TYPE"] else None
     return height is not None and height < parameters["AVOID_ALT_MIN"]
 
 
-def _limited_level(vehicle: Vehicle, velocity: Level, law: Law) -> tuple[Level, Level]:
+def _limited_level(vehicle: AutopilotVehicle, velocity: Level, law: StoppingLaw) -> tuple[Level, Level]:
     """Return a horizontal velocity within the limits, and the velocity of backing away [m/s]."""
     parameters, away = vehicle.parameters, _Retreat()
     if _uses_proximity(vehicle) and not _is_low(vehicle):
@@ -278,7 +280,7 @@ def _limited_level(vehicle: Vehicle, velocity: Level, law: Law) -> tuple[Level, 
         for shape in _fence_shapes(vehicle):
             for towards, far in _away_from((north, east), shape):
                 away.add(towards, law.speed(margin - far, BACK_SHARE))
-            if isinstance(shape, Circle):
+            if isinstance(shape, FenceCircle):
                 velocity = _within_circle(velocity, (north, east), shape, margin, law)
             else:
                 velocity = _within_edges(velocity, (north, east), shape.edges(), margin, law)
@@ -294,7 +296,7 @@ def _backed(velocity: Level, retreat: Level) -> Level:
     return axis(velocity[0], retreat[0]), axis(velocity[1], retreat[1])
 
 
-def _with_limited_change(vehicle: Vehicle, wanted: Vector, limited: Vector) -> Vector:
+def _with_limited_change(vehicle: AutopilotVehicle, wanted: Vector, limited: Vector) -> Vector:
     """Return *limited*, which changes by AVOID_ACCEL_MAX at most from the velocity before it."""
     state, now = avoidance_of(vehicle), vehicle.kernel.now()
     if limited == wanted:
@@ -320,7 +322,7 @@ TOO_CLOSE = 0.6
 """Distance of an obstacle up to which a copter is not armed [m]."""
 
 
-def obstacle_problems(vehicle: Vehicle) -> list[str]:
+def obstacle_problems(vehicle: AutopilotVehicle) -> list[str]:
     """Return the text that refuses arming beside an obstacle, if there is one."""
     nearest = closest(vehicle) if _uses_proximity(vehicle) else None
     if nearest is None or nearest[0] > TOO_CLOSE:
@@ -331,7 +333,7 @@ def obstacle_problems(vehicle: Vehicle) -> list[str]:
 LIMITED = (Control.CLIMB, Control.VELOCITY, Control.POSITION_CLIMB)
 
 
-def _limited_climb(vehicle: Vehicle, climb: float, law: Law) -> float:
+def _limited_climb(vehicle: AutopilotVehicle, climb: float, law: StoppingLaw) -> float:
     """Return a climb rate [m/s] within the ceiling and the distance above; beyond them the vehicle sinks."""
     if climb <= 0.0 or vehicle.manoeuvre.taking_off:
         return climb
@@ -346,7 +348,7 @@ def _limited_climb(vehicle: Vehicle, climb: float, law: Law) -> float:
     return -min(law.speed(-left), max(0.0, parameters["AVOID_BACKZ_SPD"]))
 
 
-def _leaning_away(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def _leaning_away(vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return a set-point of ALT_HOLD with the lean away from obstacles within AVOID_DIST_MAX."""
     parameters, sensor = vehicle.parameters, proximity_of(vehicle)
     most, reach = radians(parameters["AVOID_ANGLE_MAX"] / 100.0), parameters["AVOID_DIST_MAX"]
@@ -367,11 +369,11 @@ def _leaning_away(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     return replace(setpoint, roll=roll, pitch=pitch)
 
 
-def limit_copter(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def limit_copter(vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return a copter's set-point as avoidance limits it."""
     if setpoint.control not in LIMITED or not vehicle.parameters["AVOID_ENABLE"]:
         return setpoint
-    law = Law(GAIN, BRAKE, vehicle.parameters["AVOID_BEHAVE"] == 1.0)
+    law = StoppingLaw(GAIN, BRAKE, vehicle.parameters["AVOID_BEHAVE"] == 1.0)
     if setpoint.control is Control.CLIMB:
         setpoint = _leaning_away(vehicle, setpoint) if vehicle.mode.name == "ALT_HOLD" else setpoint
         climb = _limited_climb(vehicle, setpoint.climb, law)
@@ -394,7 +396,7 @@ def limit_copter(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
 # -- a rover
 
 
-def limit_rover(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def limit_rover(vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return a rover's set-point as avoidance limits it."""
     if setpoint.control not in (Control.DRIVE, Control.POSITION) or not vehicle.parameters["AVOID_ENABLE"]:
         return setpoint
@@ -402,7 +404,7 @@ def limit_rover(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     speed = setpoint.velocity[0] if drives else setpoint.speed
     heading = vehicle.estimate.attitude[2]
     wanted = turn_clockwise((speed, 0.0), heading)
-    law = Law(0.0, min(BRAKE, 0.5 * vehicle.tuning.accel), vehicle.parameters["AVOID_BEHAVE"] == 1.0)
+    law = StoppingLaw(0.0, min(BRAKE, 0.5 * vehicle.tuning.accel), vehicle.parameters["AVOID_BEHAVE"] == 1.0)
     level, retreat = _limited_level(vehicle, wanted, law)
     level = _backed(level, retreat)
     if level == wanted:
@@ -419,7 +421,7 @@ def limit_rover(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     return replace(setpoint, control=Control.DRIVE, velocity=(limited, 0.0, 0.0))
 
 
-def _switch_proximity(vehicle: Vehicle, position: int) -> None:
+def _switch_proximity(vehicle: AutopilotVehicle, position: int) -> None:
     if position:
         avoidance_of(vehicle).by_proximity = position > 0
 

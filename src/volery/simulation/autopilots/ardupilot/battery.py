@@ -15,7 +15,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     to_int16,
     to_uint16,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 FIRST_BATTERY = 1
 """Bit of the only battery in the mask of BATTERY_RESET."""
@@ -27,17 +27,17 @@ MEASURED_AFTER = int(2.4 * S)
 """Uptime [ns] from which battery and compass are read and the copter's terrain follower runs."""
 
 
-def used_mah(vehicle: Vehicle) -> float:
+def used_mah(vehicle: AutopilotVehicle) -> float:
     """Return the charge [mAh] used by the gauge."""
     return vehicle.estimate.battery_used_mah + vehicle.reports.gauge_offset_mah
 
 
-def left_mah(vehicle: Vehicle) -> float:
+def left_mah(vehicle: AutopilotVehicle) -> float:
     """Return the charge [mAh] left of BATT_CAPACITY; negative once more than that has been used."""
     return vehicle.parameters["BATT_CAPACITY"] - used_mah(vehicle)
 
 
-def on_battery_reset(vehicle: Vehicle, command: Command) -> int:
+def on_battery_reset(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle BATTERY_RESET: param1 is a mask of batteries, param2 the charge left [%], limited to 0..100."""
     if not 0.0 <= command.param1 <= LARGEST_MASK:
         return DENIED
@@ -48,7 +48,7 @@ def on_battery_reset(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def gauge(vehicle: Vehicle) -> tuple[int, int, int]:
+def gauge(vehicle: AutopilotVehicle) -> tuple[int, int, int]:
     """Return voltage [mV], current [cA] and remaining charge [%]; -1 where unknown."""
     if vehicle.uptime() < MEASURED_AFTER:
         return 0, -1, -1
@@ -62,7 +62,7 @@ def gauge(vehicle: Vehicle) -> tuple[int, int, int]:
     )
 
 
-def battery_status(vehicle: Vehicle) -> Fields:
+def battery_status(vehicle: AutopilotVehicle) -> Fields:
     """Return BATTERY_STATUS."""
     volts, amps, left = gauge(vehicle)
     estimate = vehicle.estimate
@@ -82,7 +82,7 @@ CHARGE_OK, CHARGE_LOW, CHARGE_CRITICAL = 1, 2, 3
 """MAV_BATTERY_CHARGE_STATE."""
 
 
-def _charge_state(vehicle: Vehicle) -> int:
+def _charge_state(vehicle: AutopilotVehicle) -> int:
     """Return the level that the failsafes of the battery have found."""
     active = vehicle.failsafes.active
     if "battery critical" in active:

@@ -16,10 +16,10 @@ from volery.simulation.autopilots.ardupilot.modes import (
     reports_of,
     update_prearm_state,
 )
-from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
 from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
-from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, VehicleAction
 from volery.trace.events import INFO
 
 DEBUG = 7
@@ -30,7 +30,7 @@ BANNER = (
 )
 
 
-def banner(name: str, version: Version) -> bytes:
+def banner(name: str, version: ArduPilotVersion) -> bytes:
     """Return the text that the firmware prints on its console after power-on."""
     return BANNER.format(name=name, version=version.text).encode()
 
@@ -43,7 +43,7 @@ def action_event(seconds: float, act: VehicleAction) -> BootEvent:
 def texts_event(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
     """Return an event that sends these status texts."""
 
-    def act(vehicle: Vehicle) -> None:
+    def act(vehicle: AutopilotVehicle) -> None:
         for text in texts:
             vehicle.send_text(severity, text)
 
@@ -53,7 +53,7 @@ def texts_event(seconds: float, *texts: str, severity: int = INFO) -> BootEvent:
 def announcement_event(seconds: float, *names: str) -> BootEvent:
     """Return an event that announces these parameters."""
 
-    def act(vehicle: Vehicle) -> None:
+    def act(vehicle: AutopilotVehicle) -> None:
         for name in names:
             if name in vehicle.parameters:
                 vehicle.output.parameter_changed(name)
@@ -64,7 +64,7 @@ def announcement_event(seconds: float, *names: str) -> BootEvent:
 def measurement_event(seconds: float, values: Sequence[tuple[str, float]]) -> BootEvent:
     """Return an event that sets these parameters to measured values and announces them."""
 
-    def act(vehicle: Vehicle) -> None:
+    def act(vehicle: AutopilotVehicle) -> None:
         for name, value in values:
             vehicle.set_parameter(name, value)
 
@@ -76,24 +76,24 @@ def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
 
 
-def set_up_outputs(vehicle: Vehicle) -> None:
+def set_up_outputs(vehicle: AutopilotVehicle) -> None:
     """Let the features set up their outputs."""
     for act in build_of(vehicle).boots:
         act(vehicle)
 
 
-def set_origin(vehicle: Vehicle) -> None:
+def set_origin(vehicle: AutopilotVehicle) -> None:
     """Set the estimator's origin where the vehicle is."""
     vehicle.flight.set_origin()
 
 
-def set_home_position(vehicle: Vehicle) -> None:
+def set_home_position(vehicle: AutopilotVehicle) -> None:
     """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.position_ok and vehicle.home is None:
         vehicle.set_home_here()
 
 
-def find_home(vehicle: Vehicle) -> None:
+def find_home(vehicle: AutopilotVehicle) -> None:
     """Set the home position as soon as the estimator has a position, if it had none at the usual time."""
     late = vehicle.uptime() > vehicle.rules.startup.origin_after + S // 2
     waits = vehicle.home is None and late and "elevation" not in vehicle.reports.sent_once
@@ -102,14 +102,14 @@ def find_home(vehicle: Vehicle) -> None:
         report_field_elevation(vehicle)
 
 
-def report_field_elevation(vehicle: Vehicle) -> None:
+def report_field_elevation(vehicle: AutopilotVehicle) -> None:
     """Report the altitude of the home position once after a boot."""
     if vehicle.home is not None and "elevation" not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add("elevation")
         vehicle.send_text(INFO, f"Field Elevation Set: {round(vehicle.home.amsl)}m")
 
 
-def report_gps_use(vehicle: Vehicle, units: Sequence[int]) -> None:
+def report_gps_use(vehicle: AutopilotVehicle, units: Sequence[int]) -> None:
     """Report that these estimator units use GPS, unless they use external poses."""
     for unit in () if vehicle.estimate.by_poses else units:
         vehicle.send_text(INFO, f"EKF3 IMU{unit} is using GPS")
@@ -147,13 +147,13 @@ COPTER_PRESSURE = (("BARO1_GND_PRESS", 101079.71), ("BARO2_GND_PRESS", 101081.83
 ROVER_PRESSURE = (("BARO1_GND_PRESS", 100997.73), ("BARO2_GND_PRESS", 100994.25))
 
 
-def store_parameters(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> None:
+def store_parameters(vehicle: AutopilotVehicle, values: Sequence[tuple[str, float]]) -> None:
     """Store measured values without an announcement."""
     for name, value in values:
         vehicle.parameters.set(name, value)
 
 
-def copter_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...]:
+def copter_events(version: ArduPilotVersion, ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a copter. ``ready`` is called at the end of the set-up."""
     return (
         announcement_event(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
@@ -189,7 +189,7 @@ def copter_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ..
     )
 
 
-def rover_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...]:
+def rover_events(version: ArduPilotVersion, ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a rover. ``ready`` is called at the end of the set-up."""
     return (
         texts_event(0.01, "Calibrating barometer"),
@@ -227,13 +227,13 @@ def rover_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...
 STORE_COUNTERS_EVERY = 30 * S
 
 
-def skip_reports(vehicle: Vehicle) -> None:
+def skip_reports(vehicle: AutopilotVehicle) -> None:
     """Regard the reports of the boot as sent: a warm vehicle has its home a moment later."""
     vehicle.reports.sent_once.add("elevation")
     reports_of(vehicle).arming_checks_at = reports_of(vehicle).counters_at = vehicle.uptime()
 
 
-def on_position(vehicle: Vehicle) -> None:
+def on_position(vehicle: AutopilotVehicle) -> None:
     """Set the home position and evaluate the pre-arm checks of a vehicle that starts warm."""
     set_home_position(vehicle)
     if vehicle.home is None:
@@ -241,7 +241,7 @@ def on_position(vehicle: Vehicle) -> None:
     vehicle.arming.checks_passed = not failing_prearm_checks(vehicle)
 
 
-def each_second(vehicle: Vehicle) -> None:
+def each_second(vehicle: AutopilotVehicle) -> None:
     """Evaluate the pre-arm checks, and store the flight time and run time counters every 30 s."""
     if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return

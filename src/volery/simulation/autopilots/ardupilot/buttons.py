@@ -13,7 +13,7 @@ from volery.simulation.autopilots.ardupilot.auxiliary import run_function
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.mavlink.messages import boot_ms
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 BUTTONS = 4
 INVERTED = 1 << 1
@@ -39,7 +39,7 @@ class ButtonState:
 buttons_of = Kept(ButtonState)
 
 
-def read_buttons(vehicle: Vehicle) -> None:
+def read_buttons(vehicle: AutopilotVehicle) -> None:
     """Report the buttons after a change, and run their functions; after a boot also without a change."""
     parameters, state = vehicle.parameters, buttons_of(vehicle)
     if not parameters["BTN_ENABLE"]:
@@ -59,7 +59,7 @@ def read_buttons(vehicle: Vehicle) -> None:
         _run_functions(vehicle, pressed, every=first)
 
 
-def _pressed(vehicle: Vehicle) -> int:
+def _pressed(vehicle: AutopilotVehicle) -> int:
     """Return the buttons whose pins are high, one bit each."""
     parameters = vehicle.parameters
     pins = round(parameters["SIM_PIN_MASK"])
@@ -67,7 +67,7 @@ def _pressed(vehicle: Vehicle) -> int:
     return sum((pins >> pin & 1) << number for number, pin in enumerate(numbers) if pin >= 0)
 
 
-def _run_functions(vehicle: Vehicle, pressed: int, *, every: bool) -> None:
+def _run_functions(vehicle: AutopilotVehicle, pressed: int, *, every: bool) -> None:
     """Run the functions of buttons that differ from when they last ran, or of every button."""
     already = buttons_of(vehicle).on
     for number in range(BUTTONS):

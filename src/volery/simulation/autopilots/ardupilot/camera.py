@@ -13,7 +13,7 @@ from typing import Any
 
 from volery.base.frames import Vector
 from volery.base.time import US, Ns, from_seconds
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept, as_command
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, MissionCommand, as_command
 from volery.simulation.autopilots.ardupilot.servo_outputs import write
 from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
@@ -27,7 +27,7 @@ from volery.simulation.autopilots.mavlink.messages import (
 )
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 SERVO, COMPONENTS = 1, 5
 """CAM1_TYPE."""
@@ -70,11 +70,11 @@ class CameraState:
 camera_of = Kept(CameraState)
 
 
-def _present(vehicle: Vehicle) -> bool:
+def _present(vehicle: AutopilotVehicle) -> bool:
     return camera_of(vehicle).kind in (SERVO, COMPONENTS)
 
 
-def take_picture(vehicle: Vehicle) -> bool:
+def take_picture(vehicle: AutopilotVehicle) -> bool:
     """Take a picture and return whether it was taken now.
 
     One that comes before CAM1_INTRVAL_MIN has passed since the last is taken then; one that comes while the
@@ -101,7 +101,7 @@ def take_picture(vehicle: Vehicle) -> bool:
     return True
 
 
-def _forward(vehicle: Vehicle, number: int, *params: float) -> None:
+def _forward(vehicle: AutopilotVehicle, number: int, *params: float) -> None:
     """Send a command to the components of the vehicle, if one has been received."""
     if camera_of(vehicle).has_components:
         values = {f"param{place}": 0.0 for place in range(1, 8)}
@@ -110,13 +110,13 @@ def _forward(vehicle: Vehicle, number: int, *params: float) -> None:
         vehicle.output.send_event("COMMAND_LONG", fields)
 
 
-def on_component(vehicle: Vehicle, _fields: dict[str, Any], sender: int) -> None:
+def on_component(vehicle: AutopilotVehicle, _fields: dict[str, Any], sender: int) -> None:
     """Handle HEARTBEAT of a component of the vehicle."""
     if sender == vehicle.system:
         camera_of(vehicle).has_components = True
 
 
-def update_camera(vehicle: Vehicle) -> None:
+def update_camera(vehicle: AutopilotVehicle) -> None:
     """Release the trigger, and take the pictures that are due by time or distance, at each tick."""
     camera, parameters, now = camera_of(vehicle), vehicle.parameters, vehicle.kernel.now()
     if camera.kind is None:
@@ -134,7 +134,7 @@ def update_camera(vehicle: Vehicle) -> None:
         take_picture(vehicle)
 
 
-def _due_by_distance(vehicle: Vehicle, camera: CameraState) -> bool:
+def _due_by_distance(vehicle: AutopilotVehicle, camera: CameraState) -> bool:
     """Return whether the vehicle is CAM1_TRIGG_DIST away from the last picture, or from where it was set."""
     parameters, estimate = vehicle.parameters, vehicle.estimate
     every, most_roll = parameters["CAM1_TRIGG_DIST"], parameters["CAM_MAX_ROLL"]
@@ -151,7 +151,7 @@ def _due_by_distance(vehicle: Vehicle, camera: CameraState) -> bool:
     return hypot(here[0] - camera.place[0], here[1] - camera.place[1]) >= every
 
 
-def _feedback_now(vehicle: Vehicle, camera: CameraState) -> Fields:
+def _feedback_now(vehicle: AutopilotVehicle, camera: CameraState) -> Fields:
     estimate = vehicle.estimate
     latitude, longitude, amsl = estimate.geodetic
     roll, pitch, yaw = (degrees(angle) for angle in estimate.attitude)
@@ -168,12 +168,12 @@ def _feedback_now(vehicle: Vehicle, camera: CameraState) -> Fields:
     }
 
 
-def feedback(vehicle: Vehicle) -> Fields | None:
+def feedback(vehicle: AutopilotVehicle) -> Fields | None:
     """Return CAMERA_FEEDBACK of the last picture, empty before the first; ``None`` without a camera."""
     return camera_of(vehicle).feedback if _present(vehicle) else None
 
 
-def _control(vehicle: Vehicle, params: tuple[float, ...]) -> None:
+def _control(vehicle: AutopilotVehicle, params: tuple[float, ...]) -> None:
     """Take a picture or give the order to the components; params as in DIGICAM_CONTROL, from the first."""
     if int(params[4]) == SHOOT:
         take_picture(vehicle)
@@ -181,26 +181,26 @@ def _control(vehicle: Vehicle, params: tuple[float, ...]) -> None:
         _forward(vehicle, DIGICAM_CONTROL, *params)
 
 
-def _set_distance(vehicle: Vehicle, metres: float, at_once: bool) -> None:
+def _set_distance(vehicle: AutopilotVehicle, metres: float, at_once: bool) -> None:
     vehicle.parameters.set("CAM1_TRIGG_DIST", metres)
     if at_once:
         take_picture(vehicle)
 
 
-def on_digicam_control(vehicle: Vehicle, command: Command) -> int:
+def on_digicam_control(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_DIGICAM_CONTROL: param5 is 1 for a picture."""
     params = (command.param1, command.param2, command.param3, command.param4, command.fifth, command.sixth)
     _control(vehicle, params)
     return ACCEPTED
 
 
-def on_digicam_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_digicam_message(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle the deprecated DIGICAM_CONTROL."""
     names = ("session", "zoom_pos", "zoom_step", "focus_lock", "shot", "command_id")
     _control(vehicle, tuple(float(fields[name]) for name in names))
 
 
-def on_digicam_configure(vehicle: Vehicle, command: Command) -> int:
+def on_digicam_configure(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_DIGICAM_CONFIGURE, which is for the components."""
     if camera_of(vehicle).kind == COMPONENTS:
         params = (command.param1, command.param2, command.param3, command.param4)
@@ -208,13 +208,13 @@ def on_digicam_configure(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_trigger_distance(vehicle: Vehicle, command: Command) -> int:
+def on_trigger_distance(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_CAM_TRIGG_DIST: param1 metres between pictures, 0 none; param3 is 1 for one at once."""
     _set_distance(vehicle, command.param1, command.param3 == 1.0)
     return ACCEPTED
 
 
-def on_start_capture(vehicle: Vehicle, command: Command) -> int:
+def on_start_capture(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle IMAGE_START_CAPTURE: param2 seconds between param3 pictures, 0 without end; 0 and 0 is one."""
     camera, period, count = camera_of(vehicle), command.param2, round(command.param3)
     if command.param1 < 0.0:
@@ -227,7 +227,7 @@ def on_start_capture(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_stop_capture(vehicle: Vehicle, command: Command) -> int:
+def on_stop_capture(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle IMAGE_STOP_CAPTURE."""
     if not 0.0 <= command.param1 <= 1.0 or (command.param1 == 1.0 and not _present(vehicle)):
         return UNSUPPORTED
@@ -244,7 +244,7 @@ CAMERA_COMMANDS: Mapping[int, Handler] = {
 }
 
 
-def act_on_camera(vehicle: Vehicle, item: MissionItem) -> None:
+def act_on_camera(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute the mission item DO_DIGICAM_CONTROL or DO_SET_CAM_TRIGG_DIST."""
     if item.command == DIGICAM_CONTROL:
         _control(vehicle, (item.param1, item.param2, item.param3, item.param4, float(item.x), float(item.y)))
@@ -252,7 +252,7 @@ def act_on_camera(vehicle: Vehicle, item: MissionItem) -> None:
         _set_distance(vehicle, item.param1, item.param3 == 1.0)
 
 
-def picture_by_switch(vehicle: Vehicle, position: int) -> None:
+def picture_by_switch(vehicle: AutopilotVehicle, position: int) -> None:
     """Take a picture when the switch goes up."""
     if position > 0:
         take_picture(vehicle)
@@ -272,19 +272,21 @@ COPTER = Feature(
     commands=CAMERA_COMMANDS,
     messages={"DIGICAM_CONTROL": on_digicam_message, "HEARTBEAT": on_component},
     items={
-        DIGICAM_CONTROL: Item("DigiCamCtrl", act_on_camera, silent=True),
-        TRIGGER_DISTANCE: Item("SetCamTrigDst", act_on_camera, silent=True),
-        DIGICAM_CONFIGURE: Item("DigiCamCfg", as_command(on_digicam_configure), silent=True),
-        START_CAPTURE: Item("ImageStartCapture", as_command(on_start_capture), silent=True),
-        STOP_CAPTURE: Item("ImageStopCapture", as_command(on_stop_capture), silent=True),
-        SET_ZOOM: Item("SetCameraZoom", silent=True),
-        SET_FOCUS: Item("SetCameraFocus", silent=True),
-        SET_SOURCE: Item("SetCameraSource", silent=True),
-        START_VIDEO: Item("VideoStartCapture", silent=True),
-        STOP_VIDEO: Item("VideoStopCapture", silent=True),
+        DIGICAM_CONTROL: MissionCommand("DigiCamCtrl", act_on_camera, silent=True),
+        TRIGGER_DISTANCE: MissionCommand("SetCamTrigDst", act_on_camera, silent=True),
+        DIGICAM_CONFIGURE: MissionCommand("DigiCamCfg", as_command(on_digicam_configure), silent=True),
+        START_CAPTURE: MissionCommand("ImageStartCapture", as_command(on_start_capture), silent=True),
+        STOP_CAPTURE: MissionCommand("ImageStopCapture", as_command(on_stop_capture), silent=True),
+        SET_ZOOM: MissionCommand("SetCameraZoom", silent=True),
+        SET_FOCUS: MissionCommand("SetCameraFocus", silent=True),
+        SET_SOURCE: MissionCommand("SetCameraSource", silent=True),
+        START_VIDEO: MissionCommand("VideoStartCapture", silent=True),
+        STOP_VIDEO: MissionCommand("VideoStopCapture", silent=True),
     },
     switches={CAMERA_SWITCH: picture_by_switch},
     on_tick=update_camera,
     telemetry={"CAMERA_FEEDBACK": feedback},
 )
-ROVER = replace(COPTER, items={**COPTER.items, TRIGGER_DISTANCE: Item("SetCamTrigDst", act_on_camera)})
+ROVER = replace(
+    COPTER, items={**COPTER.items, TRIGGER_DISTANCE: MissionCommand("SetCamTrigDst", act_on_camera)}
+)

@@ -43,7 +43,7 @@ from volery.simulation.autopilots.onboard_mission import (
     JUMP_TAG,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL, INFO, NOTICE, WARNING
 
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
@@ -65,7 +65,7 @@ CLIMB_SPEED, DESCENT_SPEED = 2, 3
 """Values of param1 of DO_CHANGE_SPEED."""
 
 
-def on_arm(vehicle: Vehicle, command: Command) -> int:
+def on_arm(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle COMPONENT_ARM_DISARM."""
     magic = round(command.param2)
     if command.param1 == 1.0:
@@ -75,12 +75,12 @@ def on_arm(vehicle: Vehicle, command: Command) -> int:
     return UNSUPPORTED
 
 
-def on_set_mode(vehicle: Vehicle, command: Command) -> int:
+def on_set_mode(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_MODE."""
     return set_mode(vehicle, round(command.param1), round(command.param2))
 
 
-def number_of(vehicle: Vehicle, name: str) -> int:
+def number_of(vehicle: AutopilotVehicle, name: str) -> int:
     """Return the number of a mode that every vehicle of that kind has."""
     return next(number for number, mode in vehicle.rules.modes.items() if mode.name == name)
 
@@ -88,13 +88,13 @@ def number_of(vehicle: Vehicle, name: str) -> int:
 def to_mode(name: str) -> Handler:
     """Return the handler of a command that only enters the mode of that name."""
 
-    def handle(vehicle: Vehicle, _command: Command) -> int:
+    def handle(vehicle: AutopilotVehicle, _command: Command) -> int:
         return ACCEPTED if change_mode(vehicle, number_of(vehicle, name)) else FAILED
 
     return handle
 
 
-def on_takeoff(vehicle: Vehicle, command: Command) -> int:
+def on_takeoff(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle NAV_TAKEOFF: requires an armed vehicle on the ground in a mode that supports a take-off."""
     if command.frame != GLOBAL_RELATIVE:
         return DENIED
@@ -112,7 +112,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
     return FAILED
 
 
-def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
+def on_mission_start(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle MISSION_START: enter AUTO and allow the take-off."""
     if not vehicle.armed or not change_mode(vehicle, number_of(vehicle, "AUTO")):
         return FAILED
@@ -122,7 +122,7 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-def on_change_speed(vehicle: Vehicle, command: Command) -> int:
+def on_change_speed(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_CHANGE_SPEED; a rover has a speed of its own only on the way to a point."""
     guided = vehicle.manoeuvre.flown
     drives_itself = bool(vehicle.mode.controls) and not vehicle.mode.pilot
@@ -133,7 +133,7 @@ def on_change_speed(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if change_speed(vehicle, round(command.param1), command.param2) else FAILED
 
 
-def change_speed(vehicle: Vehicle, kind: int, speed: float) -> bool:
+def change_speed(vehicle: AutopilotVehicle, kind: int, speed: float) -> bool:
     """Set a speed that holds until the mode changes, and return whether it is valid.
 
     Args:
@@ -154,7 +154,7 @@ def change_speed(vehicle: Vehicle, kind: int, speed: float) -> bool:
     return True
 
 
-def on_condition_yaw(vehicle: Vehicle, command: Command) -> int:
+def on_condition_yaw(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle CONDITION_YAW: an absolute heading or a relative angle."""
     if not 0.0 <= command.param1 <= 360.0 or command.param4 not in (0.0, 1.0):
         return FAILED
@@ -166,7 +166,7 @@ SLEW_YAW = 60.0
 """ATC_SLEW_YAW: fastest turn to a heading [deg/s], and the rate where a command names none."""
 
 
-def turn_to(vehicle: Vehicle, degrees: float, rate: float, direction: float, relative: bool) -> None:
+def turn_to(vehicle: AutopilotVehicle, degrees: float, rate: float, direction: float, relative: bool) -> None:
     """Turn to a heading in modes that the autopilot flies.
 
     Args:
@@ -192,7 +192,7 @@ def turn_to(vehicle: Vehicle, degrees: float, rate: float, direction: float, rel
     commanded.yaw_rate = radians(min(SLEW_YAW, rate) if rate > 0.0 else SLEW_YAW)
 
 
-def continue_turn(vehicle: Vehicle, seconds: float) -> None:
+def continue_turn(vehicle: AutopilotVehicle, seconds: float) -> None:
     """Move the commanded heading along its turn by some seconds, or keep it on the region of interest."""
     commanded = vehicle.commanded
     if commanded.look_at is not None:
@@ -205,7 +205,7 @@ def continue_turn(vehicle: Vehicle, seconds: float) -> None:
     commanded.yaw_left -= passed
 
 
-def on_set_home(vehicle: Vehicle, command: Command) -> int:
+def on_set_home(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_HOME. The altitude is AMSL in COMMAND_LONG and follows the frame in COMMAND_INT."""
     if command.param1 == 1.0 or (command.x == 0.0 and command.y == 0.0):
         if not vehicle.has_position:
@@ -234,7 +234,7 @@ def _means_here(command: Command) -> bool:
     return (command.x == 0.0 and command.y == 0.0) or level
 
 
-def on_reposition(vehicle: Vehicle, command: Command) -> int:
+def on_reposition(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; copters ignore the speed."""
     guided = number_of(vehicle, "GUIDED")
     if not command.is_int:
@@ -253,7 +253,9 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if go_to(vehicle, command.frame, (command.x, command.y, command.z), yaw) else FAILED
 
 
-def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: float | None = None) -> bool:
+def go_to(
+    vehicle: AutopilotVehicle, frame: int, place: tuple[float, float, float], yaw: float | None = None
+) -> bool:
     """Send a vehicle in GUIDED to a point, and return whether that was possible.
 
     Args:
@@ -275,12 +277,12 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
     return True
 
 
-def go_to_item(vehicle: Vehicle, item: MissionItem) -> bool:
+def go_to_item(vehicle: AutopilotVehicle, item: MissionItem) -> bool:
     """Fly to a mission item with ``current`` 2, the deprecated form of a guided target."""
     return item.has_place and go_to(vehicle, item.frame, (item.x / 1e7, item.y / 1e7, item.z))
 
 
-def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
+def on_set_yaw_speed(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle NAV_SET_YAW_SPEED of a rover: heading [deg] and speed [m/s].
 
     With a positive param3 the angle adds to the heading that was last asked for.
@@ -296,18 +298,18 @@ def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_reverse(vehicle: Vehicle, command: Command) -> int:
+def on_reverse(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_REVERSE of a rover: 1 drives to points backwards, until the mode changes."""
     vehicle.commanded.backwards = command.param1 == 1.0
     return ACCEPTED
 
 
-def on_termination(vehicle: Vehicle, command: Command) -> int:
+def on_termination(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_FLIGHTTERMINATION: stop the motors, also in flight."""
     return disarm(vehicle, force=True) if command.param1 > 0.5 else FAILED
 
 
-def on_set_current(vehicle: Vehicle, command: Command) -> int:
+def on_set_current(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_MISSION_CURRENT."""
     return ACCEPTED if vehicle.choose_item(round(command.param1)) else DENIED
 
@@ -315,7 +317,7 @@ def on_set_current(vehicle: Vehicle, command: Command) -> int:
 LARGEST_TAG = 65_535
 
 
-def on_jump_to_tag(vehicle: Vehicle, command: Command) -> int:
+def on_jump_to_tag(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_JUMP_TAG: make the first mission item JUMP_TAG with that number the current one."""
     if not 0.0 <= command.param1 <= LARGEST_TAG:
         return DENIED
@@ -331,7 +333,7 @@ KEPT_CALIBRATION = 76.0
 ERASE = 2.0
 
 
-def on_calibration(vehicle: Vehicle, command: Command) -> int:
+def on_calibration(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle PREFLIGHT_CALIBRATION: of gyroscopes and barometer, for which nothing has to be moved."""
     if vehicle.armed:
         vehicle.send_text(NOTICE, "Disarm to allow calibration")
@@ -345,7 +347,7 @@ def on_calibration(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if KEPT_CALIBRATION in (command.fifth, command.param2) else UNSUPPORTED
 
 
-def on_storage(vehicle: Vehicle, command: Command) -> int:
+def on_storage(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle PREFLIGHT_STORAGE: 2 erases the parameters, which have their defaults from the next boot on."""
     if command.param1 != ERASE:
         return DENIED
@@ -354,12 +356,12 @@ def on_storage(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_compass_calibration(_vehicle: Vehicle, _command: Command) -> int:
+def on_compass_calibration(_vehicle: AutopilotVehicle, _command: Command) -> int:
     """Refuse the commands that begin and accept a calibration of the compass: it would have no effect."""
     return FAILED
 
 
-def on_reboot(vehicle: Vehicle, command: Command) -> int:
+def on_reboot(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle PREFLIGHT_REBOOT_SHUTDOWN: 1 and 3 restart after the answer; an armed vehicle needs force."""
     if round(command.param1) not in (1, 3):
         return UNSUPPORTED
@@ -372,7 +374,7 @@ def on_reboot(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_get_home(vehicle: Vehicle, _command: Command) -> int:
+def on_get_home(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle GET_HOME_POSITION."""
     if vehicle.home is None:
         return FAILED
@@ -380,7 +382,7 @@ def on_get_home(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-def on_pause(vehicle: Vehicle, command: Command) -> int:
+def on_pause(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_PAUSE_CONTINUE: 0 pauses, 1 continues."""
     if command.param1 not in (0.0, 1.0):
         return DENIED
@@ -390,7 +392,7 @@ def on_pause(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if done else FAILED
 
 
-def on_prearm_checks(vehicle: Vehicle, _command: Command) -> int:
+def on_prearm_checks(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle RUN_PREARM_CHECKS: make the checks of arming and report those that fail."""
     if vehicle.armed:
         return TEMPORARILY_REJECTED

@@ -23,7 +23,7 @@ from volery.simulation.autopilots.ardupilot.failsafes import (
     radio_never_received,
     radio_too_low,
 )
-from volery.simulation.autopilots.ardupilot.feature import TICK, Check, Feature, build_of
+from volery.simulation.autopilots.ardupilot.feature import TICK, ArmingCheck, Feature, build_of
 from volery.simulation.autopilots.ardupilot.firmware import (
     MESSAGE_HANDLERS,
     ardupilot_mavlink,
@@ -58,9 +58,9 @@ from volery.simulation.autopilots.ardupilot.modes import (
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_PARAMETERS, copter_tuning
 from volery.simulation.autopilots.ardupilot.sensor_status import POSITION_KEPT, Health
 from volery.simulation.autopilots.ardupilot.telemetry import ACTIVE, CRITICAL, STANDBY
-from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
-from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.autopilot_parameters import StoredParameter, load
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Acro,
@@ -72,17 +72,17 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
     ReturnAlongTrack,
     Stabilize,
 )
-from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
+from volery.simulation.autopilots.manoeuvres.to_point import Brake, DescendAndLand, ReturnAndLand
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
+    AutopilotVehicle,
     Mode,
     RcDefaults,
     StartupTimes,
-    Vehicle,
     VehicleRules,
 )
 from volery.trace.events import INFO
@@ -157,8 +157,8 @@ MODES = (
         pilot=True,
         user_takeoff=True,
     ),
-    Mode(6, "RTL", AUTO_BITS, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
-    Mode(9, "LAND", MANUAL_BITS, Land, LEVEL_AND_HEIGHT, armable=False),
+    Mode(6, "RTL", AUTO_BITS, ReturnAndLand, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+    Mode(9, "LAND", MANUAL_BITS, DescendAndLand, LEVEL_AND_HEIGHT, armable=False),
     Mode(1, "ACRO", MANUAL_BITS, Acro, pilot=True, manual_throttle=True),
     Mode(7, "CIRCLE", AUTO_BITS, CircleMode, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     Mode(11, "DRIFT", MANUAL_BITS, Drift, needs_position=True, pilot=True, manual_throttle=True),
@@ -170,26 +170,28 @@ MODES = (
 )
 
 CHECKS = (
-    Check("GCS failsafe on", lambda vehicle: "station" in vehicle.failsafes.active),
-    Check("Need Alt Estimate", in_position_modes(0.0, 5.7)),
-    Check("Gyros not healthy", between_uptimes(0.0, 1.8)),
-    Check("Accels inconsistent", between_uptimes(1.8, 11.5)),
-    Check("Gyros inconsistent", between_uptimes(11.5, 22.35)),
-    Check("EKF attitude is bad", between_uptimes(0.0, 5.6)),
-    Check("Compass not healthy", between_uptimes(0.0, 2.4)),
-    Check("AHRS: EKF3 not started", in_other_modes(0.0, 4.28)),
-    Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
-    Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
-    Check("RC not found", radio_never_received),
-    Check("Throttle below failsafe", radio_too_low),
+    ArmingCheck("GCS failsafe on", lambda vehicle: "station" in vehicle.failsafes.active),
+    ArmingCheck("Need Alt Estimate", in_position_modes(0.0, 5.7)),
+    ArmingCheck("Gyros not healthy", between_uptimes(0.0, 1.8)),
+    ArmingCheck("Accels inconsistent", between_uptimes(1.8, 11.5)),
+    ArmingCheck("Gyros inconsistent", between_uptimes(11.5, 22.35)),
+    ArmingCheck("EKF attitude is bad", between_uptimes(0.0, 5.6)),
+    ArmingCheck("Compass not healthy", between_uptimes(0.0, 2.4)),
+    ArmingCheck("AHRS: EKF3 not started", in_other_modes(0.0, 4.28)),
+    ArmingCheck("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
+    ArmingCheck("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
+    ArmingCheck("RC not found", radio_never_received),
+    ArmingCheck("Throttle below failsafe", radio_too_low),
     *SHARED_CHECKS,
-    Check("Battery failsafe", lambda vehicle: not BATTERY_FAILSAFES.isdisjoint(vehicle.failsafes.active)),
+    ArmingCheck(
+        "Battery failsafe", lambda vehicle: not BATTERY_FAILSAFES.isdisjoint(vehicle.failsafes.active)
+    ),
 )
 
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
 
 
-def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
+def arming_problems(vehicle: AutopilotVehicle, *, by_rudder: bool = False) -> list[str]:
     """Return the texts of all checks that forbid arming now: pre-arm checks, else mode or sticks."""
     found = failing_prearm_checks(vehicle)
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
@@ -202,17 +204,17 @@ def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
     return sticks_not_neutral(vehicle, by_rudder=by_rudder)
 
 
-def _throttle_is_high(vehicle: Vehicle) -> bool:
+def _throttle_is_high(vehicle: AutopilotVehicle) -> bool:
     sticks = ManualFlight(vehicle)
     throttle = sticks.pilot.throttle
     return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
 
 
-def _initial_mode(vehicle: Vehicle) -> Mode:
+def _initial_mode(vehicle: AutopilotVehicle) -> Mode:
     return vehicle.rules.modes.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0])
 
 
-def finish_setup(vehicle: Vehicle) -> None:
+def finish_setup(vehicle: AutopilotVehicle) -> None:
     """Finish the set-up: on the ground, in the mode that INITIAL_MODE names."""
     vehicle.ground.landed = True
     initial = _initial_mode(vehicle)
@@ -220,7 +222,7 @@ def finish_setup(vehicle: Vehicle) -> None:
         vehicle.enter_mode(initial)
 
 
-def start_warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: AutopilotVehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
     boot.skip_reports(vehicle)
@@ -228,7 +230,7 @@ def start_warm(vehicle: Vehicle) -> None:
     finish_setup(vehicle)
 
 
-def on_step(vehicle: Vehicle) -> None:
+def on_step(vehicle: AutopilotVehicle) -> None:
     """Read the transmitter, let the features work, and disarm automatically, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
@@ -251,7 +253,7 @@ def on_step(vehicle: Vehicle) -> None:
         _disarm_automatically(vehicle)
 
 
-def _notice_flight(vehicle: Vehicle) -> None:
+def _notice_flight(vehicle: AutopilotVehicle) -> None:
     height = vehicle.height
     if height > ALIGNS_ABOVE and "aligned" not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add("aligned")
@@ -264,7 +266,7 @@ def _notice_flight(vehicle: Vehicle) -> None:
             vehicle.send_text(INFO, f"SIM Hit ground at {truth.contact_speed:.6f} m/s")
 
 
-def _disarm_stopped_motors(vehicle: Vehicle) -> None:
+def _disarm_stopped_motors(vehicle: AutopilotVehicle) -> None:
     """Disarm, also in flight, once a switch has kept the motors from turning for half of DISARM_DELAY."""
     stopped, delay = vehicle.arming.motors_stopped_at, vehicle.parameters["DISARM_DELAY"]
     since = max(stopped, vehicle.arming.armed_at)
@@ -272,7 +274,7 @@ def _disarm_stopped_motors(vehicle: Vehicle) -> None:
         disarm(vehicle, force=True)
 
 
-def _disarm_automatically(vehicle: Vehicle) -> None:
+def _disarm_automatically(vehicle: AutopilotVehicle) -> None:
     now = vehicle.kernel.now()
     finished = vehicle.mode.name == "LAND" or (
         vehicle.mode.name in ("RTL", "SMART_RTL") and vehicle.manoeuvre.landing
@@ -287,14 +289,14 @@ def _disarm_automatically(vehicle: Vehicle) -> None:
         disarm(vehicle, force=True)
 
 
-def system_status(vehicle: Vehicle) -> int:
+def system_status(vehicle: AutopilotVehicle) -> int:
     """Return the MAV_STATE: failsafe, on the ground or flying."""
     if vehicle.failsafes.active:
         return CRITICAL
     return STANDBY if vehicle.landed else ACTIVE
 
 
-def send_banner(vehicle: Vehicle, version: Version) -> None:
+def send_banner(vehicle: AutopilotVehicle, version: ArduPilotVersion) -> None:
     """Send the status texts that follow a parameter list request."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
     send_version(vehicle, "ArduCopter", version)
@@ -302,7 +304,7 @@ def send_banner(vehicle: Vehicle, version: Version) -> None:
 
 
 @cache
-def parameters() -> tuple[Parameter, ...]:
+def parameters() -> tuple[StoredParameter, ...]:
     """Return the recorded parameters."""
     return load("volery.simulation.autopilots.ardupilot", "data/copter.parameters")
 
@@ -325,7 +327,7 @@ CORE = Feature(
 """What ArduCopter has without features, in every version."""
 
 
-def copter(version: Version, optional: Collection[str]) -> Firmware:
+def copter(version: ArduPilotVersion, optional: Collection[str]) -> Firmware:
     """Return ArduCopter in one version, with some features beside those that are on by default."""
     target = {"ATTITUDE_TARGET": telemetry.attitude_target} if version.sends_attitude_target else {}
     attitude = strict_copter_attitude if version.rates_all_or_none else copter_attitude

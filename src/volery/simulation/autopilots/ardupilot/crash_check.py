@@ -13,7 +13,7 @@ from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_
 from volery.simulation.autopilots.ardupilot.modes import disarm
 from volery.simulation.autopilots.ardupilot.pilot_input import lacks_motor
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import EMERGENCY
 
 CRASH_AFTER = 2 * S
@@ -42,7 +42,7 @@ def _angle(a: Vector, b: Vector) -> float:
     return degrees(acos(max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True))))))
 
 
-def check_crash(vehicle: Vehicle) -> None:
+def check_crash(vehicle: AutopilotVehicle) -> None:
     """Disarm a vehicle in flight that leans far from its target for two seconds, as after a roll-over."""
     if not vehicle.armed or vehicle.landed or conditions_of(vehicle).suspended:
         return

@@ -13,7 +13,7 @@ from math import degrees, hypot
 from volery.base.elementary import atan2
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.feature import LogForm
-from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
 
@@ -61,7 +61,7 @@ ARMED_EVENT, DISARMED_EVENT = 10, 11
 FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT)
 
 
-def encode(log: FlightLog, version: Version, added: Sequence[LogForm]) -> bytes:
+def encode(log: FlightLog, version: ArduPilotVersion, added: Sequence[LogForm]) -> bytes:
     """Return a log in DataFlash format; *added* are the messages of ``FlightLog.extras``."""
     extra_forms = {form.name: _Form(*form) for form in added}
     name = "ArduCopter" if log.flies else "ArduRover"
@@ -78,7 +78,10 @@ def encode(log: FlightLog, version: Version, added: Sequence[LogForm]) -> bytes:
         for form in (*FORMS, *extra_forms.values())
     ]
     out.append(MSG.row(start, f"{name} {version.text}".encode()))
-    out += [PARM.row(start, one.name.encode(), one.value, one.value) for one in log.parameters]
+    out += [
+        PARM.row(start, parameter.name.encode(), parameter.value, parameter.value)
+        for parameter in log.parameters
+    ]
     out += [ARM.row(start, 1, 0, 0, 1), EV.row(start, ARMED_EVENT)]
     mode = -1.0
     for sample, extras in zip(samples, log.extras, strict=True):

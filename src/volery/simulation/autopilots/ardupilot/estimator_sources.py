@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from volery.base.time import Ns, S
-from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Feature, Kept
 from volery.simulation.autopilots.ardupilot.parameter_checks import EXTERNAL, GPS, SETS
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command, Fields
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL
 
 SET_SOURCES, SOURCES_OPTION = 42_007, 90
@@ -40,7 +40,7 @@ class SourceState:
 sources_of = Kept(SourceState)
 
 
-def choose_sources(vehicle: Vehicle, number: int) -> None:
+def choose_sources(vehicle: AutopilotVehicle, number: int) -> None:
     """Use the sources of a set, from 1; before the estimator has an origin nothing changes."""
     source = vehicle.parameters[f"EK3_SRC{number}_POSXY"]
     ignored = source != GPS
@@ -55,7 +55,7 @@ def choose_sources(vehicle: Vehicle, number: int) -> None:
             vehicle.flight.use_gps(not ignored)
 
 
-def on_set_sources(vehicle: Vehicle, command: Command) -> int:
+def on_set_sources(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle SET_EKF_SOURCE_SET: param1 is the set, 1 to 3."""
     if not SETS[0] <= command.param1 < SETS[-1] + 1:
         return DENIED
@@ -67,7 +67,7 @@ GLITCH_AFTER, GLITCH_CLEARED_AFTER = 1.0, 10 * S
 """Time for which all fixes are refused [s], and are fused again [ns], until EKF3 says so."""
 
 
-def watch_glitches(vehicle: Vehicle) -> None:
+def watch_glitches(vehicle: AutopilotVehicle) -> None:
     """Note the beginning and end of a glitch of the satellites, which a copter reports."""
     sources, now = sources_of(vehicle), vehicle.kernel.now()
     refused = vehicle.estimate.gps_refused
@@ -83,12 +83,12 @@ def watch_glitches(vehicle: Vehicle) -> None:
         vehicle.send_text(CRITICAL, "GPS Glitch or Compass error" if glitching else "Glitch cleared")
 
 
-def switch_sources(vehicle: Vehicle, position: int) -> None:
+def switch_sources(vehicle: AutopilotVehicle, position: int) -> None:
     """Choose the first set with the switch down, the second in the middle, the third up."""
     choose_sources(vehicle, position + 2)
 
 
-def _amend_report(vehicle: Vehicle, report: Fields) -> Fields:
+def _amend_report(vehicle: AutopilotVehicle, report: Fields) -> Fields:
     """Return EKF_STATUS_REPORT with the flag of a glitch."""
     return {**report, "flags": report["flags"] | GLITCHING} if sources_of(vehicle).glitching else report
 
@@ -99,4 +99,4 @@ ROVER = Feature(
     on_tick=watch_glitches,
     amends={"EKF_STATUS_REPORT": _amend_report},
 )
-COPTER = replace(ROVER, checks=(Check("GPS glitching", lambda vehicle: sources_of(vehicle).glitching),))
+COPTER = replace(ROVER, checks=(ArmingCheck("GPS glitching", lambda vehicle: sources_of(vehicle).glitching),))

@@ -15,13 +15,19 @@ from volery.base.elementary import cbrt
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot.boot import for_both_units
 from volery.simulation.autopilots.ardupilot.estimator_sources import sources_of
-from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Feature, Kept
 from volery.simulation.autopilots.ardupilot.parameter_checks import EXTERNAL, GPS
 from volery.simulation.autopilots.ardupilot.telemetry import EKF_ALIGNED_AFTER
-from volery.simulation.autopilots.external_aiding import ExternalAiding, Fusion, Pose, place_origin, pose_of
+from volery.simulation.autopilots.external_aiding import (
+    AidingPose,
+    ExternalAiding,
+    Fusion,
+    place_origin,
+    pose_of,
+)
 from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO, WARNING
 
 HEALTHY_FOR: Ns = 300 * MS
@@ -54,25 +60,25 @@ class NavigationState:
 navigation_of = Kept(NavigationState)
 
 
-def _kind(vehicle: Vehicle) -> int:
+def _kind(vehicle: AutopilotVehicle) -> int:
     state = navigation_of(vehicle)
     if state.kind is None:
         state.kind = round(vehicle.parameters["VISO_TYPE"])
     return state.kind
 
 
-def _source(vehicle: Vehicle, of: str) -> int:
+def _source(vehicle: AutopilotVehicle, of: str) -> int:
     """Return the source of a quantity in the chosen set."""
     return round(vehicle.parameters[f"EK3_SRC{sources_of(vehicle).number}_{of}"])
 
 
-def position_error(pose: Pose) -> float:
+def position_error(pose: AidingPose) -> float:
     """Return the standard deviation of a pose [m]: the cube root of the sum of its squared variances."""
     north, east, down = pose.variances[:3]
     return cbrt(north * north + east * east + down * down)
 
 
-def _fusion(vehicle: Vehicle, pose: Pose) -> Fusion:
+def _fusion(vehicle: AutopilotVehicle, pose: AidingPose) -> Fusion:
     p = vehicle.parameters
     sigma = min(max(position_error(pose), p["VISO_POS_M_NSE"], 0.01), LARGEST_SIGMA)
     return Fusion(
@@ -86,7 +92,7 @@ def _fusion(vehicle: Vehicle, pose: Pose) -> Fusion:
     )
 
 
-def on_pose(vehicle: Vehicle, fields: dict[str, Any], _sender: int, *, name: str) -> None:
+def on_pose(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int, *, name: str) -> None:
     """Handle VISION_POSITION_ESTIMATE and ODOMETRY."""
     pose = pose_of(name, fields)
     if not _kind(vehicle) or pose is None:
@@ -108,13 +114,13 @@ def on_pose(vehicle: Vehicle, fields: dict[str, Any], _sender: int, *, name: str
         state.aiding.fuse(vehicle, pose, age, _fusion(vehicle, pose))
 
 
-def on_origin(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_origin(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_GPS_GLOBAL_ORIGIN."""
     if place_origin(vehicle, navigation_of(vehicle).aiding, fields):
         vehicle.output.send_message("GPS_GLOBAL_ORIGIN")
 
 
-def follow_source(vehicle: Vehicle) -> None:
+def follow_source(vehicle: AutopilotVehicle) -> None:
     """Take the position from poses while the chosen set says so, and stop aiding when they stay away."""
     state, now = navigation_of(vehicle), vehicle.kernel.now()
     aiding, by_poses = state.aiding, vehicle.estimate.by_poses
@@ -137,14 +143,14 @@ def follow_source(vehicle: Vehicle) -> None:
             vehicle.send_text(WARNING, text)
 
 
-def _unhealthy(vehicle: Vehicle) -> bool:
+def _unhealthy(vehicle: AutopilotVehicle) -> bool:
     """Return whether no pose has come for a moment, though there should be some."""
     received = navigation_of(vehicle).aiding.received_at
     silent = received == NEVER or vehicle.kernel.now() - received > HEALTHY_FOR
     return bool(_kind(vehicle)) and silent
 
 
-def _origin(vehicle: Vehicle) -> list[Fields]:
+def _origin(vehicle: AutopilotVehicle) -> list[Fields]:
     """Return GPS_GLOBAL_ORIGIN for an origin that a user has set, while the core does not send it."""
     sent = vehicle.home is not None and vehicle.position_ok
     if not navigation_of(vehicle).aiding.placed or sent:
@@ -164,7 +170,7 @@ COPTER = ROVER = Feature(
         **{name: partial(on_pose, name=name) for name in ("VISION_POSITION_ESTIMATE", "ODOMETRY")},
         "SET_GPS_GLOBAL_ORIGIN": on_origin,
     },
-    checks=(Check("VisOdom: not healthy", _unhealthy),),
+    checks=(ArmingCheck("VisOdom: not healthy", _unhealthy),),
     on_tick=follow_source,
     extends={"GPS_GLOBAL_ORIGIN": _origin},
 )

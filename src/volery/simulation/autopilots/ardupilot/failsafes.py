@@ -10,11 +10,11 @@ from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
 from volery.simulation.autopilots.ardupilot.feature import Kept
 from volery.simulation.autopilots.ardupilot.modes import AUTO_RTL, change_mode, disarm, received_of
-from volery.simulation.autopilots.autopilot import Failsafe
+from volery.simulation.autopilots.autopilot import WatchedCondition
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
-from volery.simulation.autopilots.manoeuvres.to_point import Land
+from volery.simulation.autopilots.manoeuvres.to_point import DescendAndLand
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL, WARNING
 
 LOST_FOR: Ns = S
@@ -44,7 +44,7 @@ class FailsafeConditions:
 conditions_of = Kept(FailsafeConditions)
 
 
-def station_lost(vehicle: Vehicle) -> bool:
+def station_lost(vehicle: AutopilotVehicle) -> bool:
     """Return whether a ground station that was received is silent for longer than FS_GCS_TIMEOUT."""
     if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or received_of(vehicle).station_at == NEVER:
         return False
@@ -54,24 +54,24 @@ def station_lost(vehicle: Vehicle) -> bool:
     return silence > from_seconds(vehicle.parameters["FS_GCS_TIMEOUT"])
 
 
-def radio_lost(vehicle: Vehicle) -> bool:
+def radio_lost(vehicle: AutopilotVehicle) -> bool:
     """Return whether the throttle channel is below FS_THR_VALUE."""
     if vehicle.parameters["FS_THR_ENABLE"] == 0.0 or conditions_of(vehicle).suspended:
         return False
     return vehicle.rc[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
 
-def radio_never_received(vehicle: Vehicle) -> bool:
+def radio_never_received(vehicle: AutopilotVehicle) -> bool:
     """Return whether FS_THR_ENABLE expects a transmitter and none was received since boot."""
     return vehicle.parameters["FS_THR_ENABLE"] != 0.0 and not received_of(vehicle).transmitter
 
 
-def radio_too_low(vehicle: Vehicle) -> bool:
+def radio_too_low(vehicle: AutopilotVehicle) -> bool:
     """Return whether a transmitter that was received is lost now."""
     return received_of(vehicle).transmitter and radio_lost(vehicle)
 
 
-def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
+def _battery_below(vehicle: AutopilotVehicle, volts: str, charge: str) -> bool:
     parameters, estimate = vehicle.parameters, vehicle.estimate
     if vehicle.uptime() < 3 * S:
         return False
@@ -83,21 +83,21 @@ def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
     return vehicle.kernel.now() - since >= from_seconds(parameters["BATT_LOW_TIMER"])
 
 
-def battery_low(vehicle: Vehicle) -> bool:
+def battery_low(vehicle: AutopilotVehicle) -> bool:
     """Return whether BATT_LOW_VOLT or BATT_LOW_MAH was crossed; the state does not clear."""
     return "battery low" in vehicle.failsafes.active or _battery_below(
         vehicle, "BATT_LOW_VOLT", "BATT_LOW_MAH"
     )
 
 
-def battery_critical(vehicle: Vehicle) -> bool:
+def battery_critical(vehicle: AutopilotVehicle) -> bool:
     """Return whether BATT_CRT_VOLT or BATT_CRT_MAH was crossed; the state does not clear."""
     return "battery critical" in vehicle.failsafes.active or _battery_below(
         vehicle, "BATT_CRT_VOLT", "BATT_CRT_MAH"
     )
 
 
-def estimator_lost(vehicle: Vehicle) -> bool:
+def estimator_lost(vehicle: AutopilotVehicle) -> bool:
     """Return whether the estimator has had a position, and has had none for a second."""
     since, reported = conditions_of(vehicle).true_since, vehicle.reports.sent_once
     if vehicle.parameters["FS_EKF_THRESH"] <= 0.0:
@@ -112,28 +112,28 @@ def estimator_lost(vehicle: Vehicle) -> bool:
     return now - since.setdefault("estimator", now) >= LOST_FOR
 
 
-def _report_battery(vehicle: Vehicle, level: str) -> int:
+def _report_battery(vehicle: AutopilotVehicle, level: str) -> int:
     """Report a low or critical battery, and return the action of BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
     volts, used = vehicle.estimate.battery_volts, used_mah(vehicle)
     vehicle.send_text(WARNING, f"Battery 1 is {level} {volts:.2f}V used {used:.0f} mAh")
     return round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
 
 
-def _report_cleared(vehicle: Vehicle, what: str) -> None:
+def _report_cleared(vehicle: AutopilotVehicle, what: str) -> None:
     vehicle.send_text(WARNING, f"{what} Failsafe Cleared")
 
 
-def _enter_first(vehicle: Vehicle, modes: tuple[int, ...]) -> None:
+def _enter_first(vehicle: AutopilotVehicle, modes: tuple[int, ...]) -> None:
     """Enter the first of these modes that is possible."""
     any(_change_mode(vehicle, mode) for mode in modes)
 
 
-def _change_mode(vehicle: Vehicle, number: int) -> bool:
+def _change_mode(vehicle: AutopilotVehicle, number: int) -> bool:
     """Enter a mode if that is possible; a landing that begins so waits first. Return whether it is flown."""
     before = vehicle.mode
     if not change_mode(vehicle, number):
         return False
-    if vehicle.mode is not before and isinstance(vehicle.manoeuvre, Land):
+    if vehicle.mode is not before and isinstance(vehicle.manoeuvre, DescendAndLand):
         vehicle.manoeuvre.waits_until = vehicle.kernel.now() + LANDS_AFTER
     return True
 
@@ -171,7 +171,7 @@ LAND_ACTION, DISARM_ACTION = 1, 5
 """Values of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT; a rover's FS_ACTION 5 disarms, too."""
 
 
-def _on_station_lost(vehicle: Vehicle) -> None:
+def _on_station_lost(vehicle: AutopilotVehicle) -> None:
     vehicle.rc.release()
     options = round(vehicle.parameters["FS_OPTIONS"])
     exception = ""
@@ -187,7 +187,7 @@ def _on_station_lost(vehicle: Vehicle) -> None:
     )
 
 
-def _on_radio_lost(vehicle: Vehicle) -> None:
+def _on_radio_lost(vehicle: AutopilotVehicle) -> None:
     options = round(vehicle.parameters["FS_OPTIONS"])
     exception = ""
     if options & CONTINUE_MISSION_ON_RADIO and vehicle.mode.name == "AUTO":
@@ -199,7 +199,7 @@ def _on_radio_lost(vehicle: Vehicle) -> None:
     )
 
 
-def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
+def _on_copter_battery(vehicle: AutopilotVehicle, level: str) -> None:
     action = _report_battery(vehicle, level)
     if action == DISARM_ACTION:
         disarm(vehicle, force=True)
@@ -207,7 +207,7 @@ def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
         _respond(vehicle, "Battery", BATTERY_ACTIONS.get(action, ()), "")
 
 
-def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str) -> None:
+def _respond(vehicle: AutopilotVehicle, what: str, modes: tuple[int, ...], exception: str) -> None:
     """Report a failsafe and act.
 
     Args:
@@ -234,7 +234,7 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str
         vehicle.send_text(WARNING, f"{what} Failsafe")
 
 
-def _battery_lands(vehicle: Vehicle) -> bool:
+def _battery_lands(vehicle: AutopilotVehicle) -> bool:
     """Return whether the battery is at a level at which it must land: no other failsafe ends that landing."""
     actions = {"battery low": "BATT_FS_LOW_ACT", "battery critical": "BATT_FS_CRT_ACT"}
     reached = (
@@ -243,7 +243,7 @@ def _battery_lands(vehicle: Vehicle) -> bool:
     return any(action in (LAND_ACTION, DISARM_ACTION) for action in reached)
 
 
-def _on_estimator_lost(vehicle: Vehicle) -> None:
+def _on_estimator_lost(vehicle: AutopilotVehicle) -> None:
     """Report it; enter LAND or ALT_HOLD as FS_EKF_ACTION demands, if the vehicle is armed and needs it."""
     now, since = vehicle.kernel.now(), conditions_of(vehicle).true_since
     if now - since.get("estimator warned", NEVER) > WARNED_EVERY:
@@ -258,11 +258,11 @@ def _on_estimator_lost(vehicle: Vehicle) -> None:
 
 
 COPTER_FAILSAFES = (
-    Failsafe("station", station_lost, _on_station_lost, partial(_report_cleared, what="GCS")),
-    Failsafe("radio", radio_lost, _on_radio_lost, partial(_report_cleared, what="Radio")),
-    Failsafe("battery low", battery_low, partial(_on_copter_battery, level="low")),
-    Failsafe("battery critical", battery_critical, partial(_on_copter_battery, level="critical")),
-    Failsafe(
+    WatchedCondition("station", station_lost, _on_station_lost, partial(_report_cleared, what="GCS")),
+    WatchedCondition("radio", radio_lost, _on_radio_lost, partial(_report_cleared, what="Radio")),
+    WatchedCondition("battery low", battery_low, partial(_on_copter_battery, level="low")),
+    WatchedCondition("battery critical", battery_critical, partial(_on_copter_battery, level="critical")),
+    WatchedCondition(
         "estimator",
         estimator_lost,
         _on_estimator_lost,
@@ -284,7 +284,7 @@ ROVER_ACTIONS = {
 """FS_ACTION and the battery actions to the modes that are tried in order."""
 
 
-def _act_on_rover(vehicle: Vehicle, action: int) -> None:
+def _act_on_rover(vehicle: AutopilotVehicle, action: int) -> None:
     if action == DISARM_ACTION:
         disarm(vehicle, force=True)
     else:
@@ -297,7 +297,7 @@ ACTIVE_IN_HOLD = 1 << 0
 """Bit of FS_OPTIONS."""
 
 
-def _lost_for_long(vehicle: Vehicle, name: str, lost: Callable[[Vehicle], bool]) -> bool:
+def _lost_for_long(vehicle: AutopilotVehicle, name: str, lost: Callable[[AutopilotVehicle], bool]) -> bool:
     """Return whether a link is lost for FS_TIMEOUT in a mode that a failsafe may end."""
     since = conditions_of(vehicle).true_since
     if not lost(vehicle):
@@ -311,7 +311,7 @@ def _lost_for_long(vehicle: Vehicle, name: str, lost: Callable[[Vehicle], bool])
     return long and not stands and vehicle.mode.name != "RTL"
 
 
-def _on_rover_link_lost(vehicle: Vehicle) -> None:
+def _on_rover_link_lost(vehicle: AutopilotVehicle) -> None:
     """Act on a lost link.
 
     The original tells the two links apart by the check that finds the time-out first, and that of the radio
@@ -325,23 +325,23 @@ def _on_rover_link_lost(vehicle: Vehicle) -> None:
         _act_on_rover(vehicle, round(vehicle.parameters["FS_ACTION"]))
 
 
-def _on_rover_battery(vehicle: Vehicle, level: str) -> None:
+def _on_rover_battery(vehicle: AutopilotVehicle, level: str) -> None:
     _act_on_rover(vehicle, _report_battery(vehicle, level))
 
 
 ROVER_FAILSAFES = (
-    Failsafe(
+    WatchedCondition(
         "station",
         partial(_lost_for_long, name="station", lost=station_lost),
         _on_rover_link_lost,
         partial(_report_cleared, what="GCS"),
     ),
-    Failsafe(
+    WatchedCondition(
         "radio",
         partial(_lost_for_long, name="radio", lost=radio_lost),
         _on_rover_link_lost,
         partial(_report_cleared, what="Radio"),
     ),
-    Failsafe("battery low", battery_low, partial(_on_rover_battery, level="low")),
-    Failsafe("battery critical", battery_critical, partial(_on_rover_battery, level="critical")),
+    WatchedCondition("battery low", battery_low, partial(_on_rover_battery, level="low")),
+    WatchedCondition("battery critical", battery_critical, partial(_on_rover_battery, level="critical")),
 )

@@ -31,8 +31,8 @@ from volery.simulation.autopilots.mavlink.messages import Command, Fields, Handl
 from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import (
+    AutopilotVehicle,
     Mode,
-    Vehicle,
     VehicleAction,
     do_nothing,
     height_above_home,
@@ -53,7 +53,7 @@ class Kept(Generic[T]):
     def __init__(self, create: Callable[[], T]) -> None:
         self._create = create
 
-    def __call__(self, vehicle: Vehicle) -> T:
+    def __call__(self, vehicle: AutopilotVehicle) -> T:
         """Return the state of a vehicle."""
         kept = vehicle.kept.get(self)
         if kept is None:
@@ -61,30 +61,30 @@ class Kept(Generic[T]):
         return cast(T, kept)
 
 
-Problems = Callable[[Vehicle], list[str]]
+Problems = Callable[[AutopilotVehicle], list[str]]
 """Returns the texts of checks that fail."""
-Switch = Callable[[Vehicle, int], None]
+Switch = Callable[[AutopilotVehicle, int], None]
 """What a switch does at a position: 1 up, 0 in the middle, -1 down."""
-ItemAction = Callable[[Vehicle, MissionItem], None]
+ItemAction = Callable[[AutopilotVehicle, MissionItem], None]
 ParameterMeanings = Mapping[str, tuple[str, str]]
 """Unit, and what the parameter changes, by its name in version 4.5."""
 
 
-class Check(NamedTuple):
+class ArmingCheck(NamedTuple):
     """One arming check: its text, and whether it fails now."""
 
     text: str
-    fails: Callable[[Vehicle], bool]
+    fails: Callable[[AutopilotVehicle], bool]
 
 
-class Item(NamedTuple):
+class MissionCommand(NamedTuple):
     """A command that is a mission item."""
 
     name: str
     """Its name in the firmware's status texts."""
     act: ItemAction | None = None
     """Executes an item that does not navigate."""
-    leg: Callable[[Vehicle, MissionItem], Leg] | None = None
+    leg: Callable[[AutopilotVehicle, MissionItem], Leg] | None = None
     """Returns the leg of an item that does."""
     silent: bool = False
     """Whether AP_Mission itself executes it: its end is not reported."""
@@ -97,7 +97,7 @@ class Item(NamedTuple):
 def as_command(handler: Handler) -> ItemAction:
     """Return an action that executes an item as the command of its number."""
 
-    def act(vehicle: Vehicle, item: MissionItem) -> None:
+    def act(vehicle: AutopilotVehicle, item: MissionItem) -> None:
         params = item.param1, item.param2, item.param3, item.param4
         handler(vehicle, Command(item.command, *params, item.x / 1e7, item.y / 1e7, item.z, item.frame, True))
 
@@ -122,7 +122,7 @@ class Feature:
     modes: tuple[Mode, ...] = ()
     mode_switches: Mapping[int, int] = field(default_factory=dict)
     """RCn_OPTION to the number of the mode that its switch enters."""
-    entries: Mapping[int, Callable[[Vehicle, Mode], bool]] = field(default_factory=dict)
+    entries: Mapping[int, Callable[[AutopilotVehicle, Mode], bool]] = field(default_factory=dict)
     """Number of a mode to what enters it, and returns whether it is flown."""
     avoiding: tuple[str, ...] = ()
     """Names of modes whose horizontal velocity avoidance limits."""
@@ -135,13 +135,13 @@ class Feature:
     """Messages that need no answer; what several features do with one is done in list order."""
     questions: Mapping[str, QuestionHandler] = field(default_factory=dict)
     """Messages that are answered."""
-    items: Mapping[int, Item] = field(default_factory=dict)
+    items: Mapping[int, MissionCommand] = field(default_factory=dict)
     """Mission items by their command."""
     switches: Mapping[int, Switch] = field(default_factory=dict)
     """RCn_OPTION to what its switch does; DO_AUX_FUNCTION and buttons do the same."""
     at_once: tuple[int, ...] = ()
     """Those that count as soon as the transmitter is first read."""
-    checks: tuple[Check, ...] = ()
+    checks: tuple[ArmingCheck, ...] = ()
     """Arming checks, after those of the core."""
     problems: Problems | None = None
     """Arming checks whose texts have figures, after all ``checks``."""
@@ -149,33 +149,33 @@ class Feature:
     """Called once in a boot, when the outputs are set up."""
     on_tick: VehicleAction | None = None
     """Work at each ``TICK``, after the manoeuvre and the switches, before automatic disarming."""
-    limit: Callable[[Vehicle, Setpoint], Setpoint] | None = None
+    limit: Callable[[AutopilotVehicle, Setpoint], Setpoint] | None = None
     """Return the set-point that a manoeuvre may give."""
-    return_point: Callable[[Vehicle], Vector | None] | None = None
+    return_point: Callable[[AutopilotVehicle], Vector | None] | None = None
     """Return where a return ends, see ``VehicleRules``."""
-    height_above_ground: Callable[[Vehicle], float] | None = None
+    height_above_ground: Callable[[AutopilotVehicle], float] | None = None
     """Return the height that a landing goes by [m]."""
     telemetry: Mapping[str, Builder] = field(default_factory=dict)
     """Messages that are sent."""
-    amends: Mapping[str, Callable[[Vehicle, Fields], Fields]] = field(default_factory=dict)
+    amends: Mapping[str, Callable[[AutopilotVehicle, Fields], Fields]] = field(default_factory=dict)
     """What is changed in messages of the core before they are sent."""
-    extends: Mapping[str, Callable[[Vehicle], list[Fields]]] = field(default_factory=dict)
+    extends: Mapping[str, Callable[[AutopilotVehicle], list[Fields]]] = field(default_factory=dict)
     """Further messages of a name that the core or another feature sends, after that."""
     high_latency: HighLatency | None = None
     """Links that carry HIGH_LATENCY2."""
     log_forms: tuple[LogForm, ...] = ()
-    log_rows: Callable[[Vehicle], tuple[LogRow, ...]] | None = None
+    log_rows: Callable[[AutopilotVehicle], tuple[LogRow, ...]] | None = None
     """Return what the log on board has beside the samples of every firmware."""
 
 
 class ArmingProblems(Protocol):
     """Returns the texts of all checks that forbid arming now."""
 
-    def __call__(self, vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
+    def __call__(self, vehicle: AutopilotVehicle, *, by_rudder: bool = False) -> list[str]:
         """Return them; *by_rudder*: for arming with the yaw stick, which then is not checked."""
 
 
-class Build:
+class FeatureSet:
     """One firmware: the tables of its core and of its features, merged in their order.
 
     Args:
@@ -190,40 +190,45 @@ class Build:
         self.features = features
         self.arming_problems = arming_problems
         self.words = words
-        self.parameters = merged([one.parameters for one in features])
-        self.modes = {mode.number: mode for one in features for mode in one.modes}
-        self.mode_switches = merged([one.mode_switches for one in features])
-        self.entries = merged([one.entries for one in features])
-        self.avoiding = frozenset(name for one in features for name in one.avoiding)
-        self.tumbling = frozenset(name for one in features for name in one.tumbling)
-        self.commands = merged([one.commands for one in features])
-        self.nan_commands = frozenset(number for one in features for number in one.nan_commands)
-        self.messages = {name: self._handler(name) for one in features for name in one.messages}
-        self.questions = merged([one.questions for one in features])
-        self.items = merged([one.items for one in features])
-        self.switches = merged([one.switches for one in features])
-        self.at_once = frozenset(option for one in features for option in one.at_once)
-        self.checks = [check for one in features for check in one.checks]
-        self.problems = [one.problems for one in features if one.problems is not None]
-        self.boots = [one.at_boot for one in features if one.at_boot is not None]
-        self.ticks = [one.on_tick for one in features if one.on_tick is not None]
-        self.limits = [one.limit for one in features if one.limit is not None]
-        self.high_latency = next((one.high_latency for one in features if one.high_latency), None)
-        self.return_point = next((one.return_point for one in features if one.return_point), do_nothing)
-        self.height_above_ground = next(
-            (one.height_above_ground for one in features if one.height_above_ground), height_above_home
+        self.parameters = merged([feature.parameters for feature in features])
+        self.modes = {mode.number: mode for feature in features for mode in feature.modes}
+        self.mode_switches = merged([feature.mode_switches for feature in features])
+        self.entries = merged([feature.entries for feature in features])
+        self.avoiding = frozenset(name for feature in features for name in feature.avoiding)
+        self.tumbling = frozenset(name for feature in features for name in feature.tumbling)
+        self.commands = merged([feature.commands for feature in features])
+        self.nan_commands = frozenset(number for feature in features for number in feature.nan_commands)
+        self.messages = {name: self._handler(name) for feature in features for name in feature.messages}
+        self.questions = merged([feature.questions for feature in features])
+        self.items = merged([feature.items for feature in features])
+        self.switches = merged([feature.switches for feature in features])
+        self.at_once = frozenset(option for feature in features for option in feature.at_once)
+        self.checks = [check for feature in features for check in feature.checks]
+        self.problems = [feature.problems for feature in features if feature.problems is not None]
+        self.boots = [feature.at_boot for feature in features if feature.at_boot is not None]
+        self.ticks = [feature.on_tick for feature in features if feature.on_tick is not None]
+        self.limits = [feature.limit for feature in features if feature.limit is not None]
+        self.high_latency = next((feature.high_latency for feature in features if feature.high_latency), None)
+        self.return_point = next(
+            (feature.return_point for feature in features if feature.return_point), do_nothing
         )
-        self.log_forms = [form for one in features for form in one.log_forms]
-        self.logs = [one.log_rows for one in features if one.log_rows is not None]
+        self.height_above_ground = next(
+            (feature.height_above_ground for feature in features if feature.height_above_ground),
+            height_above_home,
+        )
+        self.log_forms = [form for feature in features for form in feature.log_forms]
+        self.logs = [feature.log_rows for feature in features if feature.log_rows is not None]
         self.telemetry = {
-            name: self._builder(name, build) for one in features for name, build in one.telemetry.items()
+            name: self._builder(name, build)
+            for feature in features
+            for name, build in feature.telemetry.items()
         }
 
     def _handler(self, name: str) -> MessageHandler:
         """Return what handles a message: all features that know it, in their order."""
-        handlers = [one.messages[name] for one in self.features if name in one.messages]
+        handlers = [feature.messages[name] for feature in self.features if name in feature.messages]
 
-        def handle(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+        def handle(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
             for handler in handlers:
                 handler(vehicle, fields, sender)
 
@@ -231,10 +236,10 @@ class Build:
 
     def _builder(self, name: str, build: Builder) -> Builder:
         """Return the builder of a message with what the features change in it and add to it."""
-        amends = [one.amends[name] for one in self.features if name in one.amends]
-        extends = [one.extends[name] for one in self.features if name in one.extends]
+        amends = [feature.amends[name] for feature in self.features if name in feature.amends]
+        extends = [feature.extends[name] for feature in self.features if name in feature.extends]
 
-        def amended(vehicle: Vehicle) -> list[Fields]:
+        def amended(vehicle: AutopilotVehicle) -> list[Fields]:
             built = build(vehicle)
             found = built if isinstance(built, list) else [] if built is None else [built]
             for amend in amends:
@@ -243,20 +248,20 @@ class Build:
 
         return amended if amends or extends else build
 
-    def limit(self, vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+    def limit(self, vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
         """Return the set-point that is given."""
         for limit in self.limits:
             setpoint = limit(vehicle, setpoint)
         return setpoint
 
-    def log_rows(self, vehicle: Vehicle) -> tuple[LogRow, ...]:
+    def log_rows(self, vehicle: AutopilotVehicle) -> tuple[LogRow, ...]:
         """Return what the log has beside the samples of every firmware."""
         return tuple(row for rows in self.logs for row in rows(vehicle))
 
 
-def build_of(vehicle: Vehicle) -> Build:
+def build_of(vehicle: AutopilotVehicle) -> FeatureSet:
     """Return the firmware of a vehicle as it was built."""
-    return cast(Build, vehicle.firmware_state)
+    return cast(FeatureSet, vehicle.firmware_state)
 
 
 def merged(tables: Sequence[Mapping[Any, T]]) -> dict[Any, T]:

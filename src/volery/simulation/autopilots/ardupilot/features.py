@@ -14,7 +14,7 @@ from typing import NamedTuple
 from volery.simulation.autopilots.ardupilot.feature import Feature
 
 
-class Entry(NamedTuple):
+class ListedFeature(NamedTuple):
     """A feature: the name of its module, and beginnings of the names of parameters that only it has."""
 
     name: str
@@ -25,37 +25,37 @@ class Entry(NamedTuple):
 ON, OFF = True, False
 
 ORDER = (
-    Entry("follow", OFF, ("FOLL_",)),
-    Entry("buttons", OFF, ("BTN_",)),
-    Entry("servo_outputs", ON),
-    Entry("payload", ON),
-    Entry("sprayer", OFF, ("SPRAY_",)),
-    Entry("camera", ON),
-    Entry("mount_control", ON),
-    Entry("winch", OFF, ("WINCH_",)),
-    Entry("landing_gear", OFF, ("LGR_",)),
-    Entry("landing_sequence", OFF),
-    Entry("rally", ON),
-    Entry("fence", ON),
-    Entry("estimator_sources", ON),
-    Entry("external_navigation", ON),
-    Entry("proximity", ON),
-    Entry("precision_landing", ON),
-    Entry("range_finder", ON),
-    Entry("traffic", OFF, ("ADSB_", "AVD_")),
-    Entry("auxiliary", ON),
-    Entry("takeoff_check", ON),
-    Entry("weathervane", OFF, ("WVANE_",)),
-    Entry("motor_test", OFF),
-    Entry("crash_check", ON),
-    Entry("parameter_checks", ON),
-    Entry("avoidance", ON),
-    Entry("airspeed", OFF, ("ARSPD",)),
-    Entry("flip", OFF),
-    Entry("throw", OFF, ("THROW_",)),
-    Entry("guided_items", OFF),
-    Entry("payload_place", OFF, ("PLDP_",)),
-    Entry("high_latency", OFF),
+    ListedFeature("follow", OFF, ("FOLL_",)),
+    ListedFeature("buttons", OFF, ("BTN_",)),
+    ListedFeature("servo_outputs", ON),
+    ListedFeature("payload", ON),
+    ListedFeature("sprayer", OFF, ("SPRAY_",)),
+    ListedFeature("camera", ON),
+    ListedFeature("mount_control", ON),
+    ListedFeature("winch", OFF, ("WINCH_",)),
+    ListedFeature("landing_gear", OFF, ("LGR_",)),
+    ListedFeature("landing_sequence", OFF),
+    ListedFeature("rally", ON),
+    ListedFeature("fence", ON),
+    ListedFeature("estimator_sources", ON),
+    ListedFeature("external_navigation", ON),
+    ListedFeature("proximity", ON),
+    ListedFeature("precision_landing", ON),
+    ListedFeature("range_finder", ON),
+    ListedFeature("traffic", OFF, ("ADSB_", "AVD_")),
+    ListedFeature("auxiliary", ON),
+    ListedFeature("takeoff_check", ON),
+    ListedFeature("weathervane", OFF, ("WVANE_",)),
+    ListedFeature("motor_test", OFF),
+    ListedFeature("crash_check", ON),
+    ListedFeature("parameter_checks", ON),
+    ListedFeature("avoidance", ON),
+    ListedFeature("airspeed", OFF, ("ARSPD",)),
+    ListedFeature("flip", OFF),
+    ListedFeature("throw", OFF, ("THROW_",)),
+    ListedFeature("guided_items", OFF),
+    ListedFeature("payload_place", OFF, ("PLDP_",)),
+    ListedFeature("high_latency", OFF),
 )
 """Tables are merged and set-points limited in this order, and it is that of the work at each tick."""
 

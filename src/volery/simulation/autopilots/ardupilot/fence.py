@@ -14,7 +14,7 @@ from math import hypot, inf
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept, as_command
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, MissionCommand, as_command
 from volery.simulation.autopilots.ardupilot.fence_points import (
     FENCE,
     clear_if_emptied,
@@ -25,7 +25,7 @@ from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
 from volery.simulation.autopilots.ardupilot.modes import change_mode, disarm, first_of
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, to_uint32
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import NOTICE
 
 CEILING, CIRCLE, POLYGON, FLOOR = 1, 2, 4, 8
@@ -40,7 +40,7 @@ GIVE_UP = 100.0
 BACKUP = 20.0
 """Distance [m] after which a breach counts anew."""
 
-Respond = Callable[[Vehicle, float], None]
+Respond = Callable[[AutopilotVehicle, float], None]
 """Responds to a new breach at a distance beyond the fence [m]."""
 FENCE_ENABLE, FENCE_SWITCH = 207, 11
 """MAV_CMD, and value of RCn_OPTION."""
@@ -65,7 +65,7 @@ class FenceState:
 fence_of = Kept(FenceState)
 
 
-def on_fence_enable(vehicle: Vehicle, command: Command) -> int:
+def on_fence_enable(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_FENCE_ENABLE: 0 switches off, 1 on, the floor included."""
     if command.param1 not in (0.0, 1.0):
         return FAILED
@@ -73,18 +73,18 @@ def on_fence_enable(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def enable_fence(vehicle: Vehicle, *, on: bool) -> None:
+def enable_fence(vehicle: AutopilotVehicle, *, on: bool) -> None:
     """Switch the fence and its floor on or off."""
     vehicle.parameters.set("FENCE_ENABLE", float(on))
     fence_of(vehicle).floor = on
     fence_of(vehicle).breached.clear()
 
 
-def _types(vehicle: Vehicle) -> int:
+def _types(vehicle: AutopilotVehicle) -> int:
     return round(vehicle.parameters["FENCE_TYPE"])
 
 
-def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]:
+def _beyond(vehicle: AutopilotVehicle, point: Vector, *, floor: bool) -> dict[int, float]:
     """Return how far a point is beyond each limit.
 
     Args:
@@ -113,13 +113,13 @@ def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]
     return {limit: distance for limit, distance in found.items() if distance >= 0.0}
 
 
-def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
+def fence_admits(vehicle: AutopilotVehicle, point: Vector) -> bool:
     """Return whether a guided point may be flown to; a rover drives to any."""
     checked = vehicle.flies and vehicle.parameters["FENCE_ENABLE"]
     return not (checked and _beyond(vehicle, point, floor=True))
 
 
-def check_fence(vehicle: Vehicle, respond: Respond) -> None:
+def check_fence(vehicle: AutopilotVehicle, respond: Respond) -> None:
     """Check the fence; respond to a new breach of an armed vehicle."""
     fence = fence_of(vehicle)
     clear_if_emptied(vehicle)
@@ -140,7 +140,7 @@ def check_fence(vehicle: Vehicle, respond: Respond) -> None:
         respond(vehicle, max(found[limit] for limit in new))
 
 
-def fence_status(vehicle: Vehicle) -> Fields | None:
+def fence_status(vehicle: AutopilotVehicle) -> Fields | None:
     """Return FENCE_STATUS while the fence is enabled."""
     if not vehicle.parameters["FENCE_ENABLE"]:
         return None
@@ -157,7 +157,7 @@ def fence_status(vehicle: Vehicle) -> Fields | None:
 # -- arming
 
 
-def _first_problem(vehicle: Vehicle) -> str:
+def _first_problem(vehicle: AutopilotVehicle) -> str:
     """Return the text of the first check of the fence that fails; empty if none does."""
     parameters, types = vehicle.parameters, _types(vehicle)
     if not parameters["FENCE_ENABLE"]:
@@ -175,13 +175,13 @@ def _first_problem(vehicle: Vehicle) -> str:
     return _height_problem(vehicle, margin) if vehicle.flies else _breach_problem(vehicle, margin)
 
 
-def _breach_problem(vehicle: Vehicle, margin: float) -> str:
+def _breach_problem(vehicle: AutopilotVehicle, margin: float) -> str:
     if fence_of(vehicle).breached:
         return "vehicle outside fence"
     return "Invalid FENCE_MARGIN value" if margin < 0.0 else ""
 
 
-def _height_problem(vehicle: Vehicle, margin: float) -> str:
+def _height_problem(vehicle: AutopilotVehicle, margin: float) -> str:
     ceiling, floor = vehicle.parameters["FENCE_ALT_MAX"], vehicle.parameters["FENCE_ALT_MIN"]
     if ceiling < 0.0:
         return "Invalid FENCE_ALT_MAX value"
@@ -222,7 +222,7 @@ COPTER_ACTIONS = {
 """FENCE_ACTION to the modes of a copter that are tried in order; all other values: RTL, LAND."""
 
 
-def respond_copter(vehicle: Vehicle, distance: float) -> None:
+def respond_copter(vehicle: AutopilotVehicle, distance: float) -> None:
     """Respond as FENCE_ACTION demands; on the ground, or falling with the throttle closed, disarm."""
     if not vehicle.landed:
         vehicle.send_text(NOTICE, "Fence Breached")
@@ -249,7 +249,7 @@ ROVER_ACTIONS = {
 TERMINATE = 5
 
 
-def respond_rover(vehicle: Vehicle, distance: float) -> None:
+def respond_rover(vehicle: AutopilotVehicle, distance: float) -> None:
     """Respond as FENCE_ACTION demands, without a text."""
     action = round(vehicle.parameters["FENCE_ACTION"])
     if action == TERMINATE and distance <= GIVE_UP:
@@ -259,11 +259,11 @@ def respond_rover(vehicle: Vehicle, distance: float) -> None:
         any(change_mode(vehicle, mode) for mode in modes)
 
 
-def _switch_fence(vehicle: Vehicle, position: int) -> None:
+def _switch_fence(vehicle: AutopilotVehicle, position: int) -> None:
     enable_fence(vehicle, on=position > 0)
 
 
-def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
+def _amend_status(vehicle: AutopilotVehicle, status: Fields) -> Fields:
     """Return SYS_STATUS with the fence: enabled if it acts, healthy if it is not breached."""
     if not vehicle.parameters["FENCE_ENABLE"]:
         return status
@@ -292,7 +292,7 @@ ROVER = Feature(
     commands={FENCE_ENABLE: on_fence_enable},
     messages={"FENCE_POINT": on_fence_point},
     questions={"FENCE_FETCH_POINT": on_fence_fetch},
-    items={FENCE_ENABLE: Item("FenceEnable", as_command(on_fence_enable))},
+    items={FENCE_ENABLE: MissionCommand("FenceEnable", as_command(on_fence_enable))},
     switches={FENCE_SWITCH: _switch_fence},
     checks=FENCE_CHECKS,
     on_tick=partial(check_fence, respond=respond_rover),

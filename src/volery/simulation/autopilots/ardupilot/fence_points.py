@@ -19,7 +19,7 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_RELATIVE_INT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO, WARNING
 
 FENCE, RALLY = 1, 2
@@ -69,7 +69,7 @@ def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
     )
 
 
-def refuse_points(vehicle: Vehicle, kind: int, points: list[MissionItem]) -> bool:
+def refuse_points(vehicle: AutopilotVehicle, kind: int, points: list[MissionItem]) -> bool:
     """Report why a list cannot be a fence; return whether it is refused."""
     problem = _problem(points) if kind == FENCE else ""
     if problem:
@@ -100,7 +100,7 @@ def _problem(points: list[MissionItem]) -> str:
     return "Incorrect item count" if corners_left else ""
 
 
-def points_changed(vehicle: Vehicle, kind: int) -> None:
+def points_changed(vehicle: AutopilotVehicle, kind: int) -> None:
     """Store the number of rally points in RALLY_TOTAL, or of corners and two more points in FENCE_TOTAL."""
     points = vehicle.points.get(kind, [])
     if kind == RALLY:
@@ -112,7 +112,7 @@ def points_changed(vehicle: Vehicle, kind: int) -> None:
     stated_of(vehicle).total = total
 
 
-def clear_if_emptied(vehicle: Vehicle) -> None:
+def clear_if_emptied(vehicle: AutopilotVehicle) -> None:
     """Remove the fence once a station has set FENCE_TOTAL to 0."""
     total = round(vehicle.parameters["FENCE_TOTAL"])
     if total != stated_of(vehicle).total:
@@ -133,7 +133,7 @@ def _simple(points: list[MissionItem]) -> bool:
     return one and len(others) <= 1 and all(point.command == RETURN_POINT for point in others)
 
 
-def on_fence_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_fence_point(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle FENCE_POINT, the deprecated form: FENCE_TOTAL states the number of points first."""
     total, index = round(vehicle.parameters["FENCE_TOTAL"]), fields["idx"]
     problem = _wrong_total(total)
@@ -165,7 +165,7 @@ def on_fence_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> No
     stated_of(vehicle).total = total
 
 
-def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+def on_fence_fetch(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle FENCE_FETCH_POINT, the deprecated form."""
     total, index = round(vehicle.parameters["FENCE_TOTAL"]), fields["idx"]
     points = vehicle.points.get(FENCE, [])

@@ -13,13 +13,13 @@ from volery.simulation.autopilots.ardupilot.fence_points import (
     FENCE,
     INCLUSION,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 Level = tuple[float, float]
 """North and east about the estimator's origin [m], or a velocity likewise [m/s]."""
 
 
-class Polygon(NamedTuple):
+class FencePolygon(NamedTuple):
     """A polygon.
 
     Args:
@@ -44,7 +44,7 @@ class Polygon(NamedTuple):
         return list(pairwise((*self.corners, self.corners[0])))
 
 
-class Circle(NamedTuple):
+class FenceCircle(NamedTuple):
     """A circle.
 
     Args:
@@ -63,20 +63,20 @@ class Circle(NamedTuple):
         return (away <= self.radius) == self.inside
 
 
-Shape = Polygon | Circle
+Shape = FencePolygon | FenceCircle
 
 
-def shapes(vehicle: Vehicle) -> list[Shape]:
+def shapes(vehicle: AutopilotVehicle) -> list[Shape]:
     """Return the polygons and circles that were uploaded, in their order."""
     found: list[Shape] = []
     corners: list[Level] = []
     for item in vehicle.points.get(FENCE, []):
         north, east, _ = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
         if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
-            found.append(Circle((north, east), item.param1, item.command == CIRCLE_INCLUSION))
+            found.append(FenceCircle((north, east), item.param1, item.command == CIRCLE_INCLUSION))
         elif item.command in (INCLUSION, EXCLUSION):
             corners.append((north, east))
             if len(corners) == round(item.param1):
-                found.append(Polygon(tuple(corners), item.command == INCLUSION))
+                found.append(FencePolygon(tuple(corners), item.command == INCLUSION))
                 corners = []
     return found

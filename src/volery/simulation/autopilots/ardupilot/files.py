@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from functools import partial
 
 from volery.base.time import S
-from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, Parameters
+from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, VehicleParameters
 from volery.simulation.autopilots.mavlink.file_service import Content, Encode, FilePolicy
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 PACKED = "@PARAM/param.pck"
 _MAGIC = 0x671B
@@ -21,7 +21,7 @@ _PACKED_REAL = (4, "<f")
 _FAIL, _NOT_FOUND = 1, 10
 
 
-def packed_parameters(parameters: Parameters) -> bytes:
+def packed_parameters(parameters: VehicleParameters) -> bytes:
     """Return ``param.pck`` as AP_Filesystem_Param writes it: names are stated from where they differ."""
     rows, before = [], ""
     for name, kind, value, _ in parameters:
@@ -34,7 +34,7 @@ def packed_parameters(parameters: Parameters) -> bytes:
     return struct.pack("<HHH", _MAGIC, len(rows), len(rows)) + b"".join(rows)
 
 
-def onboard_files(vehicle: Vehicle, encode: Encode) -> Mapping[str, Content]:
+def onboard_files(vehicle: AutopilotVehicle, encode: Encode) -> Mapping[str, Content]:
     """Return the packed parameters, and the logs with their numbers as ArduPilot names them."""
     files: dict[str, Content] = {PACKED: lambda: packed_parameters(vehicle.parameters)}
     for number, log in enumerate(vehicle.logs, 1):

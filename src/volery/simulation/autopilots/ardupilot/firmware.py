@@ -20,13 +20,17 @@ from volery.simulation.autopilots.ardupilot import (
 )
 from volery.simulation.autopilots.ardupilot.battery import battery_status
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
-from volery.simulation.autopilots.ardupilot.feature import ArmingProblems, Build, Feature
+from volery.simulation.autopilots.ardupilot.feature import ArmingProblems, Feature, FeatureSet
 from volery.simulation.autopilots.ardupilot.features import absent, features_of
 from volery.simulation.autopilots.ardupilot.modes import set_mode
 from volery.simulation.autopilots.ardupilot.parameters import LEAST_HOVER, MOST_HOVER
 from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
-from volery.simulation.autopilots.ardupilot.versions import Version
-from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
+from volery.simulation.autopilots.autopilot_parameters import (
+    ManoeuvreTuning,
+    StoredParameter,
+    VehicleParameters,
+)
 from volery.simulation.autopilots.flight_stack.flight import Flight, hover_collective
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
@@ -49,19 +53,19 @@ from volery.simulation.autopilots.mavlink.messages import (
     Command,
     vehicle_type,
 )
-from volery.simulation.autopilots.vehicle_state import ParameterTable, Vehicle, VehicleAction
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, ParameterTable, VehicleAction
 from volery.simulation.world.body_specs import Multirotor
 from volery.trace.events import INFO
 
 SEND_BANNER = 42_428
 
 
-def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+def on_terrain_check(_vehicle: AutopilotVehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle TERRAIN_CHECK: there is no terrain data on board."""
     sender.send("TERRAIN_REPORT", {"lat": fields["lat"], "lon": fields["lon"], "spacing": 0, "pending": 0})
 
 
-def accepts(vehicle: Vehicle, name: str, system: int) -> bool:
+def accepts(vehicle: AutopilotVehicle, name: str, system: int) -> bool:
     """Return whether a message called *name* from a system counts: SYSID_ENFORCE admits SYSID_MYGCS only.
 
     The vehicle's own components and the state of the radio always count.
@@ -76,16 +80,16 @@ PRIVATE = 1 << 10
 SERIAL_PORTS = range(1, 8)
 
 
-def private_links(vehicle: Vehicle) -> frozenset[int]:
+def private_links(vehicle: AutopilotVehicle) -> frozenset[int]:
     """Return the numbers of the links that SERIALn_OPTIONS makes private."""
     options = ((port, round(vehicle.parameters[f"SERIAL{port}_OPTIONS"])) for port in SERIAL_PORTS)
     return frozenset(port for port, value in options if value & PRIVATE)
 
 
-def _questions(sent: TelemetryPolicy, build: Build) -> dict[str, QuestionHandler]:
+def _questions(sent: TelemetryPolicy, build: FeatureSet) -> dict[str, QuestionHandler]:
     """Return the handlers by message; *sent* builds AUTOPILOT_VERSION."""
 
-    def on_version(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
+    def on_version(vehicle: AutopilotVehicle, _fields: dict[str, Any], sender: Peer) -> None:
         for version in sent.build("AUTOPILOT_VERSION", vehicle):
             sender.send("AUTOPILOT_VERSION", version)
 
@@ -101,7 +105,7 @@ EXTRA1, EXTRA2, EXTRA3, ALL = 10, 11, 12, 0
 """MAV_DATA_STREAM."""
 
 
-def never_sent(_vehicle: Vehicle) -> None:
+def never_sent(_vehicle: AutopilotVehicle) -> None:
     """Return None: the firmware knows the message and has no reason to send it."""
     return
 
@@ -244,12 +248,12 @@ def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[
     return {**groups, ALL: tuple(name for names in groups.values() for name in names)}
 
 
-def board_id(vehicle: Vehicle) -> str:
+def board_id(vehicle: AutopilotVehicle) -> str:
     """Return the board's serial number, which follows from the system id."""
     return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
 
 
-def send_version(vehicle: Vehicle, name: str, version: Version) -> None:
+def send_version(vehicle: AutopilotVehicle, name: str, version: ArduPilotVersion) -> None:
     """Report firmware version and board, as after a parameter list request."""
     vehicle.send_text(INFO, f"{name} {version.text}")
     vehicle.send_text(INFO, f"{board_id(vehicle)}1f6d2a48adfda4")
@@ -274,22 +278,22 @@ def own_parameters(system: int, flight: Flight) -> dict[str, float]:
     }
 
 
-def refuse_interval(vehicle: Vehicle, number: int) -> int:
+def refuse_interval(vehicle: AutopilotVehicle, number: int) -> int:
     """Refuse SET_MESSAGE_INTERVAL of a message that the firmware does not know."""
     vehicle.send_text(INFO, f"No ap_message for mavlink id ({number})")
     return DENIED
 
 
-def ignore_stream_request(_vehicle: Vehicle, _link: int, _stream: int, _rate: int) -> None:
+def ignore_stream_request(_vehicle: AutopilotVehicle, _link: int, _stream: int, _rate: int) -> None:
     """Ignore REQUEST_DATA_STREAM: a copter stores no stream rates."""
 
 
 def builders(
-    version: Version,
+    version: ArduPilotVersion,
     kind: int,
     capabilities: int,
     health: Health,
-    system_status: Callable[[Vehicle], int],
+    system_status: Callable[[AutopilotVehicle], int],
 ) -> Mapping[str, Builder]:
     """Return the builders of all common messages.
 
@@ -322,7 +326,7 @@ MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
 
 def build_firmware(
     core: Feature, kind: str, optional: Collection[str], problems: ArmingProblems, words: tuple[str, str]
-) -> Build:
+) -> FeatureSet:
     """Return the tables of a core and its features.
 
     Args:
@@ -332,20 +336,20 @@ def build_firmware(
         problems: Returns the texts that forbid arming.
         words: Status texts of arming and disarming.
     """
-    return Build([core, *features_of(kind, optional).values()], problems, words)
+    return FeatureSet([core, *features_of(kind, optional).values()], problems, words)
 
 
 def parameter_table(
-    build: Build,
+    build: FeatureSet,
     optional: Collection[str],
-    version: Version,
-    recorded: Callable[[], tuple[Parameter, ...]],
-    tuning: Callable[[Parameters], Tuning],
+    version: ArduPilotVersion,
+    recorded: Callable[[], tuple[StoredParameter, ...]],
+    tuning: Callable[[VehicleParameters], ManoeuvreTuning],
 ) -> ParameterTable:
     """Return the parameters of one kind of vehicle: the recorded ones, but those of features that are off."""
 
     @cache
-    def defaults() -> tuple[Parameter, ...]:
+    def defaults() -> tuple[StoredParameter, ...]:
         return tuple(one for one in recorded() if not absent(one.name, optional))
 
     def remedy(name: str) -> str:
@@ -357,9 +361,9 @@ def parameter_table(
 
 
 def telemetry_policy(
-    build: Build,
+    build: FeatureSet,
     streams: Mapping[int, Sequence[str]],
-    on_stream_request: Callable[[Vehicle, int, int, int], None] = ignore_stream_request,
+    on_stream_request: Callable[[AutopilotVehicle, int, int, int], None] = ignore_stream_request,
     least_period: Ns = 3 * MS,
 ) -> TelemetryPolicy:
     """Return what one kind of vehicle sends."""
@@ -378,15 +382,15 @@ def telemetry_policy(
 
 def ardupilot_mavlink(
     *,
-    version: Version,
-    build: Build,
+    version: ArduPilotVersion,
+    build: FeatureSet,
     start: LinkStart,
     sent: TelemetryPolicy,
     on_parameter_list: VehicleAction,
 ) -> MavlinkFirmware:
     """Return the MAVLink rules of one kind of vehicle."""
 
-    def on_banner(vehicle: Vehicle, _command: Command) -> int:
+    def on_banner(vehicle: AutopilotVehicle, _command: Command) -> int:
         on_parameter_list(vehicle)
         return ACCEPTED
 

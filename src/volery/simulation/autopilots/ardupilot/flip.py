@@ -14,7 +14,7 @@ from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.ardupilot.modes import MANUAL_BITS, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, Mode
 
 PERIOD: Ns = 10 * MS
 RATE, RATE_ACCEL = radians(400.0), radians(1100.0)
@@ -31,11 +31,11 @@ FLIP, FLIP_SWITCH = 14, 2
 """Number of the mode, and value of RCn_OPTION."""
 
 
-class _Stage(IntEnum):
+class _FlipStage(IntEnum):
     START, ROLL, PITCH_UP, PITCH_DOWN, RECOVER = range(5)
 
 
-def may_flip(vehicle: Vehicle) -> bool:
+def may_flip(vehicle: AutopilotVehicle) -> bool:
     """Return whether FLIP may be entered: in flight, from a mode by hand, without a far roll stick."""
     sticks = Stabilize(vehicle).pilot
     closed = sticks.throttle <= 0.0 and vehicle.mode.manual_throttle
@@ -50,9 +50,9 @@ class Flip(Stabilize):
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._stage = _Stage.START
+        self._stage = _FlipStage.START
         self._timer: Handle | None = None
         self._started: Ns = 0
         self._last: Ns = 0
@@ -86,7 +86,11 @@ class Flip(Stabilize):
         self._rate = min(RATE, self._rate + RATE_ACCEL * passed)
         self._advance()
         moved = max(abs(pilot.roll), abs(pilot.pitch)) >= ABANDONED_BY
-        if moved or now - self._started > TIME_OUT or (self._stage == _Stage.RECOVER and self._is_level()):
+        if (
+            moved
+            or now - self._started > TIME_OUT
+            or (self._stage == _FlipStage.RECOVER and self._is_level())
+        ):
             self._stop()
             vehicle.enter_mode(vehicle.mode_before)
             return
@@ -101,14 +105,14 @@ class Flip(Stabilize):
         roll, pitch, _ = self.vehicle.estimate.attitude
         turned = roll * self._roll if self._roll else pitch * self._pitch
         inverted = abs(roll) > UPSIDE_DOWN
-        if self._stage == _Stage.START and turned >= STEEP:
-            self._stage = _Stage.ROLL if self._roll else _Stage.PITCH_UP
-        elif self._stage == _Stage.ROLL and -UPSIDE_DOWN < turned < STEEP:
-            self._stage = _Stage.RECOVER
-        elif self._stage == _Stage.PITCH_UP and inverted and turned > STEEP:
-            self._stage = _Stage.PITCH_DOWN
-        elif self._stage == _Stage.PITCH_DOWN and not inverted and turned > -STEEP:
-            self._stage = _Stage.RECOVER
+        if self._stage == _FlipStage.START and turned >= STEEP:
+            self._stage = _FlipStage.ROLL if self._roll else _FlipStage.PITCH_UP
+        elif self._stage == _FlipStage.ROLL and -UPSIDE_DOWN < turned < STEEP:
+            self._stage = _FlipStage.RECOVER
+        elif self._stage == _FlipStage.PITCH_UP and inverted and turned > STEEP:
+            self._stage = _FlipStage.PITCH_DOWN
+        elif self._stage == _FlipStage.PITCH_DOWN and not inverted and turned > -STEEP:
+            self._stage = _FlipStage.RECOVER
 
     def _is_level(self) -> bool:
         axis = 0 if self._roll else 1
@@ -116,12 +120,12 @@ class Flip(Stabilize):
 
     def _drive(self, thrust: float) -> None:
         """Give the set-point of the stage; the thrust has no correction for the lean."""
-        if self._stage == _Stage.RECOVER:
+        if self._stage == _FlipStage.RECOVER:
             roll, pitch, yaw = self._angles
             lift = min(1.0, thrust + MORE_THRUST)
             self.vehicle.drive(Setpoint(Control.ATTITUDE, roll=roll, pitch=pitch, yaw=yaw, throttle=lift))
             return
-        change = MORE_THRUST if self._stage == _Stage.START else -LESS_THRUST
+        change = MORE_THRUST if self._stage == _FlipStage.START else -LESS_THRUST
         self.vehicle.drive(
             Setpoint(
                 Control.RATE,
@@ -132,7 +136,7 @@ class Flip(Stabilize):
         )
 
 
-def _enter_flip(vehicle: Vehicle, mode: Mode) -> bool:
+def _enter_flip(vehicle: AutopilotVehicle, mode: Mode) -> bool:
     return enter(vehicle, mode, "" if may_flip(vehicle) else "init failed")
 
 

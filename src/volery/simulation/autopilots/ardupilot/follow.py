@@ -21,7 +21,7 @@ from volery.simulation.autopilots.manoeuvres.to_point import root_speed
 from volery.simulation.autopilots.mavlink.messages import all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre, Mode
 from volery.trace.events import INFO, WARNING
 
 OUTDATED: Ns = 3 * S
@@ -57,7 +57,7 @@ class LeadState:
 lead_of = Kept(LeadState)
 
 
-def _is_followed(vehicle: Vehicle, sender: int) -> bool:
+def _is_followed(vehicle: AutopilotVehicle, sender: int) -> bool:
     """Return whether FOLL_SYSID names that system; 0 is the first that reports its position."""
     lead = lead_of(vehicle)
     if not vehicle.parameters["FOLL_ENABLE"] or sender == vehicle.system:
@@ -71,7 +71,7 @@ def _is_followed(vehicle: Vehicle, sender: int) -> bool:
     return True
 
 
-def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_position(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle GLOBAL_POSITION_INT of another vehicle."""
     lead = lead_of(vehicle)
     if (fields["lat"] == 0 and fields["lon"] == 0) or not _is_followed(vehicle, sender):
@@ -85,7 +85,7 @@ def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
         lead.heading, lead.heading_at = radians(fields["hdg"] / 100.0), lead.at
 
 
-def on_target(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_target(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle FOLLOW_TARGET."""
     lead, given = lead_of(vehicle), fields["est_capabilities"]
     unusable = (fields["lat"] == 0 and fields["lon"] == 0) or not given & HAS_POSITION
@@ -105,14 +105,14 @@ def _turned(vector: Vector, angle: float) -> Vector:
     return *turn_clockwise(vector[:2], angle), vector[2]
 
 
-class Follow(Manoeuvre):
+class Follow(FlightManoeuvre):
     """Keep the place beside the other vehicle; without its position, stop.
 
     Args:
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._kept: Vector | None = None
         """Place beside the other vehicle that is kept where FOLL_OFS_X, _Y and _Z are 0."""
@@ -200,7 +200,7 @@ class Follow(Manoeuvre):
         return None
 
 
-def _enter_follow(vehicle: Vehicle, mode: Mode) -> bool:
+def _enter_follow(vehicle: AutopilotVehicle, mode: Mode) -> bool:
     if vehicle.parameters["FOLL_ENABLE"] or mode is vehicle.mode:
         return enter(vehicle, mode)
     vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")

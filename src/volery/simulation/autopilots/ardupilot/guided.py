@@ -28,7 +28,7 @@ from volery.simulation.autopilots.onboard_mission import (
     LOCAL_NED,
     LOCAL_OFFSET_NED,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 POSITION, VELOCITY, ACCELERATION, YAW, YAW_RATE = 0b111, 0b111 << 3, 0b111 << 6, 1 << 10, 1 << 11
 """Bits of ``type_mask``: a set bit ignores its group."""
@@ -51,7 +51,7 @@ ATTITUDE_IGNORED, THROTTLE_IGNORED, YAW_RATE_IGNORED, RATES_IGNORED = 1 << 7, 1 
 """Bits of SET_ATTITUDE_TARGET's ``type_mask``."""
 
 
-class Target(NamedTuple):
+class GuidedTarget(NamedTuple):
     """Target of one message, north-east-down about the estimator's origin; None: not given."""
 
     position: Vector | None
@@ -65,13 +65,13 @@ def _given(mask: int, group: int) -> bool:
     return not mask & group
 
 
-def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
+def _turned(vehicle: AutopilotVehicle, vector: Vector) -> Vector:
     """Rotate forward-right-down to north-east-down by the heading alone."""
     heading = vehicle.estimate.attitude[2]
     return *turn_clockwise(vector[:2], heading), vector[2]
 
 
-def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:
+def _turn(vehicle: AutopilotVehicle, fields: dict[str, Any], body: bool) -> Turn:
     mask = fields["type_mask"]
     yaw = fields["yaw"] if _given(mask, YAW) and isfinite(fields["yaw"]) else None
     if yaw is not None and body:
@@ -83,7 +83,7 @@ def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:
     return Turn(None if rate is not None else yaw, rate)
 
 
-def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
+def _of_local(vehicle: AutopilotVehicle, fields: dict[str, Any]) -> GuidedTarget | None:
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     if frame not in LOCAL_FRAMES:
         return None
@@ -99,12 +99,12 @@ def _of_local(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
     return _target(mask, (place, velocity, push), _turn(vehicle, fields, body))
 
 
-def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Target | None:
+def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> GuidedTarget | None:
     place, velocity, push = groups
     for group, values in ((POSITION, place), (VELOCITY, velocity), (ACCELERATION, push)):
         if _given(mask, group) and not all_within(values, FARTHEST_POINT):
             return None
-    return Target(
+    return GuidedTarget(
         place if _given(mask, POSITION) else None,
         velocity if _given(mask, VELOCITY) else None,
         push if _given(mask, ACCELERATION) else None,
@@ -113,7 +113,7 @@ def _target(mask: int, groups: tuple[Vector, Vector, Vector], turn: Turn) -> Tar
     )
 
 
-def _of_global(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
+def _of_global(vehicle: AutopilotVehicle, fields: dict[str, Any]) -> GuidedTarget | None:
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     if frame not in GLOBAL_FRAMES:
         return None
@@ -123,7 +123,7 @@ def _of_global(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
     return _target(mask, (place, velocity, push), _turn(vehicle, fields, body=False))
 
 
-def _obey(vehicle: Vehicle, target: Target | None) -> None:
+def _obey(vehicle: AutopilotVehicle, target: GuidedTarget | None) -> None:
     guided = vehicle.manoeuvre.flown
     if target is None or not isinstance(guided, Guided) or (target.force and target.acceleration is not None):
         return
@@ -136,12 +136,12 @@ def _obey(vehicle: Vehicle, target: Target | None) -> None:
         guided.follow_acceleration(target.acceleration, target.turn)
 
 
-def copter_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def copter_local(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED of a copter."""
     _obey(vehicle, _of_local(vehicle, fields))
 
 
-def copter_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def copter_global(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_GLOBAL_INT of a copter."""
     _obey(vehicle, _of_global(vehicle, fields))
 
@@ -152,12 +152,12 @@ def _states_attitude(fields: dict[str, Any]) -> bool:
     return not fields["type_mask"] & THROTTLE_IGNORED and all_within(values)
 
 
-def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def copter_attitude(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET: attitude, yaw rate, and thrust as a climb rate."""
     _follow_attitude(vehicle, fields, fed_forward=True)
 
 
-def _follow_attitude(vehicle: Vehicle, fields: dict[str, Any], fed_forward: bool) -> None:
+def _follow_attitude(vehicle: AutopilotVehicle, fields: dict[str, Any], fed_forward: bool) -> None:
     guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if not isinstance(guided, Guided) or not _states_attitude(fields):
         return
@@ -168,7 +168,7 @@ def _follow_attitude(vehicle: Vehicle, fields: dict[str, Any], fed_forward: bool
     guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])), fed_forward)
 
 
-def strict_copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def strict_copter_attitude(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle it as 4.8: without a throttle, or with some body rates but not all, it stops (from 4.6 on).
 
     A yaw rate is not fed forward, it moves the stated heading on only (from 4.7 on).
@@ -181,7 +181,7 @@ def strict_copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: in
         _follow_attitude(vehicle, fields, fed_forward=False)
 
 
-def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def rover_attitude(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET of a rover: a share of its speed, with a heading or a turn rate."""
     guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if not isinstance(guided, GuidedRover) or not _states_attitude(fields):
@@ -195,12 +195,12 @@ def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> No
         guided.follow_speed(speed, Turn(rate=fields["body_yaw_rate"]))
 
 
-def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def rover_local(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED of a rover, which reads the horizontal axes only."""
     _drive(vehicle, _of_local(vehicle, _level(fields)), fields["vx"])
 
 
-def rover_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def rover_global(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_GLOBAL_INT of a rover."""
     _drive(vehicle, _of_global(vehicle, _level(fields)), fields["vx"])
 
@@ -213,7 +213,7 @@ def _level(fields: dict[str, Any]) -> dict[str, Any]:
     return {**fields, "type_mask": mask}
 
 
-def _drive(vehicle: Vehicle, target: Target | None, ahead: float) -> None:
+def _drive(vehicle: AutopilotVehicle, target: GuidedTarget | None, ahead: float) -> None:
     """Drive to a point, along a velocity, or at a velocity's length with a heading or a turn rate of its own.
 
     Args:

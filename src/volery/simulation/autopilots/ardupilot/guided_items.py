@@ -11,14 +11,14 @@ from math import hypot
 from typing import NamedTuple
 
 from volery.base.time import from_seconds
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item
+from volery.simulation.autopilots.ardupilot.feature import Feature, MissionCommand
 from volery.simulation.autopilots.ardupilot.rover import guided_arrived, guided_stale
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
 from volery.simulation.autopilots.onboard_mission import GUIDED_ENABLE, GUIDED_LIMITS, MissionItem
 from volery.simulation.autopilots.state_groups import CommandedLimits
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 
 
 class GuidedLimits(NamedTuple):
@@ -34,18 +34,18 @@ class GuidedLimits(NamedTuple):
     """Horizontal distance [m] from where it was handed over."""
 
 
-def set_limits(vehicle: Vehicle, item: MissionItem) -> None:
+def set_limits(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute DO_GUIDED_LIMITS: whole seconds, least and largest height, and distance; 0: no limit."""
     limits = int(item.param1), item.param2, item.param3, item.param4
     vehicle.kept[GuidedLimits] = GuidedLimits(vehicle.commanded, *limits)
 
 
-def copter_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
+def copter_guided_leg(vehicle: AutopilotVehicle, item: MissionItem) -> Leg:
     """Return the leg of NAV_GUIDED_ENABLE of a copter."""
     return _leg(vehicle, item, Guided(vehicle))
 
 
-def rover_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
+def rover_guided_leg(vehicle: AutopilotVehicle, item: MissionItem) -> Leg:
     """Return the leg of NAV_GUIDED_ENABLE of a rover, which is at its end near the item's place, too."""
     leg = _leg(vehicle, item, GuidedRover(vehicle, guided_arrived, guided_stale))
     if not item.has_place:
@@ -59,7 +59,7 @@ def rover_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
     return Leg(leg.manoeuvre, lambda: leg.done() or near())
 
 
-def _leg(vehicle: Vehicle, item: MissionItem, guided: Manoeuvre) -> Leg:
+def _leg(vehicle: AutopilotVehicle, item: MissionItem, guided: FlightManoeuvre) -> Leg:
     begun, start = vehicle.kernel.now(), vehicle.estimate.position
     limits: GuidedLimits | None = vehicle.kept.get(GuidedLimits)
     if limits is None or limits.commanded is not vehicle.commanded:
@@ -81,10 +81,13 @@ def _leg(vehicle: Vehicle, item: MissionItem, guided: Manoeuvre) -> Leg:
 
 COPTER = Feature(
     items={
-        GUIDED_ENABLE: Item("GuidedEnable", leg=copter_guided_leg, keeps_frame=True),
-        GUIDED_LIMITS: Item("GuidedLimits", set_limits),
+        GUIDED_ENABLE: MissionCommand("GuidedEnable", leg=copter_guided_leg, keeps_frame=True),
+        GUIDED_LIMITS: MissionCommand("GuidedLimits", set_limits),
     }
 )
 ROVER = Feature(
-    items={**COPTER.items, GUIDED_ENABLE: Item("GuidedEnable", leg=rover_guided_leg, keeps_frame=True)}
+    items={
+        **COPTER.items,
+        GUIDED_ENABLE: MissionCommand("GuidedEnable", leg=rover_guided_leg, keeps_frame=True),
+    }
 )

@@ -13,7 +13,7 @@ from volery.simulation.autopilots.ardupilot import sensor_status, telemetry
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
 from volery.simulation.autopilots.mavlink.firmware import HighLatency
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import NOTICE
 
 CONTROL_HIGH_LATENCY = 2600
@@ -39,24 +39,24 @@ FAILURES = {
 
 
 @dataclass
-class LinkState:
+class HighLatencyLinks:
     """Links of high latency."""
 
     on: bool = False
     """Whether a command has switched them on."""
 
 
-links_of = Kept(LinkState)
+links_of = Kept(HighLatencyLinks)
 
 
-def links(vehicle: Vehicle) -> frozenset[int]:
+def links(vehicle: AutopilotVehicle) -> frozenset[int]:
     """Return the numbers of the links that SERIALn_PROTOCOL makes links of high latency."""
     return frozenset(
         port for port in SERIAL_PORTS if vehicle.parameters[f"SERIAL{port}_PROTOCOL"] == PROTOCOL
     )
 
 
-def on_control(vehicle: Vehicle, command: Command) -> int:
+def on_control(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle CONTROL_HIGH_LATENCY: param1 is 1 to switch the links on, 0 to switch them off."""
     if command.param1 not in (0.0, 1.0):
         return FAILED
@@ -69,13 +69,13 @@ def _byte(value: float) -> int:
     return min(255, max(0, int(value)))
 
 
-def _built(vehicle: Vehicle, name: str) -> Fields:
+def _built(vehicle: AutopilotVehicle, name: str) -> Fields:
     """Return a message of which there is always one."""
     built = build_of(vehicle).telemetry[name](vehicle)
     return built[0] if isinstance(built, list) else built or {}
 
 
-def report(vehicle: Vehicle) -> Fields:
+def report(vehicle: AutopilotVehicle) -> Fields:
     """Return HIGH_LATENCY2."""
     status, hud, beat = (_built(vehicle, name) for name in ("SYS_STATUS", "VFR_HUD", "HEARTBEAT"))
     latitude, longitude, amsl = vehicle.estimate.geodetic
@@ -102,7 +102,7 @@ def report(vehicle: Vehicle) -> Fields:
     }
 
 
-def _copter_targets(vehicle: Vehicle) -> Fields:
+def _copter_targets(vehicle: AutopilotVehicle) -> Fields:
     target = telemetry.nav_controller(vehicle)
     return {
         "target_altitude": int(vehicle.estimate.geodetic[2] + target.get("alt_error", 0.0)),
@@ -113,7 +113,7 @@ def _copter_targets(vehicle: Vehicle) -> Fields:
     }
 
 
-def _rover_targets(vehicle: Vehicle) -> Fields:
+def _rover_targets(vehicle: AutopilotVehicle) -> Fields:
     """Return them in the modes that the autopilot steers; the wanted speed is the measured one, as there."""
     if not vehicle.mode.controls:
         return {}

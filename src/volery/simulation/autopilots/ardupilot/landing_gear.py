@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Command
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO
 
 GEAR_OUTPUT = 29
@@ -45,7 +45,7 @@ class GearState:
 gear_of = Kept(GearState)
 
 
-def move_gear(vehicle: Vehicle, deploy: bool) -> None:
+def move_gear(vehicle: AutopilotVehicle, deploy: bool) -> None:
     """Deploy or retract, if LGR_ENABLE allows: outputs go to their upper or lower end."""
     parameters, gear = vehicle.parameters, gear_of(vehicle)
     if not parameters["LGR_ENABLE"]:
@@ -56,19 +56,19 @@ def move_gear(vehicle: Vehicle, deploy: bool) -> None:
     gear.deployed = deploy
 
 
-def on_airframe_configuration(vehicle: Vehicle, command: Command) -> int:
+def on_airframe_configuration(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle AIRFRAME_CONFIGURATION; the number of the gear (param1) is not read."""
     move_gear(vehicle, deploy=int(command.param2) != RETRACT)
     return ACCEPTED
 
 
-def switch_gear(vehicle: Vehicle, position: int) -> None:
+def switch_gear(vehicle: AutopilotVehicle, position: int) -> None:
     """Deploy with the switch down, retract with it up; the middle changes nothing."""
     if position:
         move_gear(vehicle, deploy=position < 0)
 
 
-def watch_gear(vehicle: Vehicle) -> None:
+def watch_gear(vehicle: AutopilotVehicle) -> None:
     """Move the gear where the start, a height, a take-off or a landing demands it, at each tick."""
     parameters, gear = vehicle.parameters, gear_of(vehicle)
     if not parameters["LGR_ENABLE"]:
@@ -90,7 +90,7 @@ def watch_gear(vehicle: Vehicle) -> None:
     gear.climbing, gear.landing = climbs, lands
 
 
-def _at_heights(vehicle: Vehicle) -> None:
+def _at_heights(vehicle: AutopilotVehicle) -> None:
     """Deploy or retract an armed vehicle that passes a height above home, in whole metres; 0: none."""
     gear = gear_of(vehicle)
     lower, upper = vehicle.parameters["LGR_DEPLOY_ALT"], vehicle.parameters["LGR_RETRACT_ALT"]

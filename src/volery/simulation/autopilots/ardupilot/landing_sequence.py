@@ -14,14 +14,14 @@ from volery.simulation.autopilots.ardupilot.mission import fly_mission
 from volery.simulation.autopilots.ardupilot.modes import AUTO, AUTO_BITS, AUTO_RTL, LEVEL_AND_HEIGHT, enter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import item_point
 from volery.simulation.autopilots.onboard_mission import LAND_START
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, Mode
 from volery.trace.events import INFO, WARNING
 
 SEQUENCE_SWITCH = 99
 """RCn_OPTION."""
 
 
-def nearest_landing(vehicle: Vehicle) -> int | None:
+def nearest_landing(vehicle: AutopilotVehicle) -> int | None:
     """Return the index of the nearest DO_LAND_START, or ``None`` without one or without a position.
 
     A start without a place counts as where the next item is that navigates.
@@ -40,7 +40,7 @@ def nearest_landing(vehicle: Vehicle) -> int | None:
     return min(distances, key=lambda index: distances[index], default=None)
 
 
-def leave_sequence(vehicle: Vehicle) -> None:
+def leave_sequence(vehicle: AutopilotVehicle) -> None:
     """Go on in AUTO once an item before every start of a landing has been chosen; called at each tick."""
     if vehicle.mode.number != AUTO_RTL:
         return
@@ -49,7 +49,7 @@ def leave_sequence(vehicle: Vehicle) -> None:
         vehicle.enter_mode(vehicle.rules.modes[AUTO])
 
 
-def enter_sequence(vehicle: Vehicle, mode: Mode) -> bool:
+def enter_sequence(vehicle: AutopilotVehicle, mode: Mode) -> bool:
     """Enter AUTO_RTL at the nearest start of a landing, also from a later place of the sequence."""
     start = nearest_landing(vehicle)
     if start is None:

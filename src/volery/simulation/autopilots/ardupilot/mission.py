@@ -13,9 +13,9 @@ from volery.simulation.autopilots.ardupilot.commands import (
     change_speed,
     turn_to,
 )
-from volery.simulation.autopilots.ardupilot.feature import Item, Kept, build_of
+from volery.simulation.autopilots.ardupilot.feature import Kept, MissionCommand, build_of
 from volery.simulation.autopilots.ardupilot.modes import MISSION_MODES, change_mode, disarm
-from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
+from volery.simulation.autopilots.manoeuvres.manual_flight import RoverHold
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     FlyMission,
     Leg,
@@ -54,7 +54,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 from volery.trace.events import INFO, NOTICE
 
 UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
@@ -71,7 +71,7 @@ STORED_FRAMES = {
 """The frame that is read back for the frame that was sent."""
 
 
-def stored_item(item: MissionItem, items: Mapping[int, Item]) -> MissionItem | int:
+def stored_item(item: MissionItem, items: Mapping[int, MissionCommand]) -> MissionItem | int:
     """Return an item as stored (frames without their INT variants, NaN as 0), or the MAV_MISSION_RESULT.
 
     Args:
@@ -117,7 +117,7 @@ def _wrong_place(item: MissionItem) -> int:
     return 0 if abs(item.z) < HIGHEST else INVALID_Z  # a NaN is not less
 
 
-def home_item(vehicle: Vehicle) -> MissionItem | None:
+def home_item(vehicle: AutopilotVehicle) -> MissionItem | None:
     """Return item 0, the home position."""
     home = vehicle.home
     if home is None:
@@ -127,7 +127,7 @@ def home_item(vehicle: Vehicle) -> MissionItem | None:
     )
 
 
-def mission_grew(vehicle: Vehicle, count: int) -> None:
+def mission_grew(vehicle: AutopilotVehicle, count: int) -> None:
     """Store the number of items in MIS_TOTAL."""
     vehicle.set_parameter("MIS_TOTAL", count)
 
@@ -143,19 +143,19 @@ class ReachedItem:
 reached_of = Kept(ReachedItem)
 
 
-def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+def item_begins(vehicle: AutopilotVehicle, index: int, item: MissionItem) -> None:
     """Report the item that begins."""
     known = build_of(vehicle).items.get(item.command)
     vehicle.send_text(INFO, f"Mission: {index} {known.name if known else 'Unknown'}")
 
 
-def _is_reported(vehicle: Vehicle, item: MissionItem) -> bool:
+def _is_reported(vehicle: AutopilotVehicle, item: MissionItem) -> bool:
     """Return whether the end of an action is reported by its number."""
     known = build_of(vehicle).items.get(item.command)
     return known is None or not known.silent
 
 
-def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+def item_done(vehicle: AutopilotVehicle, index: int, item: MissionItem) -> None:
     """Send MISSION_ITEM_REACHED, and a status text for items that reach a place or wait.
 
     The first action after the item is done in the same step of the original, which keeps one number to be
@@ -172,7 +172,7 @@ def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
         vehicle.send_text(INFO, f"Reached {words} #{index}")
 
 
-def action_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+def action_done(vehicle: AutopilotVehicle, index: int, item: MissionItem) -> None:
     """Report an action by its number, unless that has been sent instead of the item before it."""
     if reached_of(vehicle).number == index:
         reached_of(vehicle).number = None
@@ -180,57 +180,57 @@ def action_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
         vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
 
 
-def jumped(vehicle: Vehicle, index: int, times: int, of: int) -> None:
+def jumped(vehicle: AutopilotVehicle, index: int, times: int, of: int) -> None:
     """Report a jump."""
     vehicle.send_text(INFO, f"Mission: {index} Jump {times}/{of if of >= 0 else 'unlimited'}")
 
 
-def _change_speed(vehicle: Vehicle, item: MissionItem) -> None:
+def _change_speed(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     if change_speed(vehicle, round(item.param1), item.param2) and not vehicle.flies:
         vehicle.send_text(INFO, f"speed: {item.param2:.1f} m/s")
 
 
-def _turn(vehicle: Vehicle, item: MissionItem) -> None:
+def _turn(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     turn_to(vehicle, item.param1, item.param2, item.param3, relative=item.param4 == 1.0)
 
 
-def _set_home(vehicle: Vehicle, item: MissionItem) -> None:
+def _set_home(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     if item.param1 == 1.0 or not item.has_place:
         vehicle.set_home_here()
     else:
         vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
 
 
-def _reverse(vehicle: Vehicle, item: MissionItem) -> None:
+def _reverse(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     vehicle.commanded.backwards = item.param1 == 1.0
 
 
-ITEMS: Mapping[int, Item] = {
-    WAYPOINT: Item("WP", placed=True),
-    SPLINE_WAYPOINT: Item("SplineWP", placed=True),
-    LOITER_UNLIMITED: Item("LoitUnlim", placed=True),
-    LOITER_TURNS: Item("LoitTurns", placed=True),
-    LOITER_TIME: Item("LoitTime", placed=True),
-    LOITER_TO_ALTITUDE: Item("LoitAltitude", placed=True),
-    RETURN: Item("RTL"),
-    LAND: Item("Land", placed=True),
-    TAKEOFF: Item("Takeoff", placed=True),
-    DELAY: Item("Delay"),
-    SET_YAW_SPEED: Item("SetYawSpd"),
-    CONDITION_DELAY: Item("CondDelay"),
-    CONDITION_DISTANCE: Item("CondDist"),
-    CONDITION_YAW: Item("CondYaw", _turn),
-    CHANGE_SPEED: Item("ChangeSpeed", _change_speed),
-    SET_HOME: Item("SetHome", _set_home, placed=True),
-    JUMP: Item("Jump"),
-    SET_REVERSE: Item("SetReverse", _reverse),
-    JUMP_TAG: Item("Tag", silent=True),
-    LAND_START: Item("LandStart", keeps_frame=True),
+ITEMS: Mapping[int, MissionCommand] = {
+    WAYPOINT: MissionCommand("WP", placed=True),
+    SPLINE_WAYPOINT: MissionCommand("SplineWP", placed=True),
+    LOITER_UNLIMITED: MissionCommand("LoitUnlim", placed=True),
+    LOITER_TURNS: MissionCommand("LoitTurns", placed=True),
+    LOITER_TIME: MissionCommand("LoitTime", placed=True),
+    LOITER_TO_ALTITUDE: MissionCommand("LoitAltitude", placed=True),
+    RETURN: MissionCommand("RTL"),
+    LAND: MissionCommand("Land", placed=True),
+    TAKEOFF: MissionCommand("Takeoff", placed=True),
+    DELAY: MissionCommand("Delay"),
+    SET_YAW_SPEED: MissionCommand("SetYawSpd"),
+    CONDITION_DELAY: MissionCommand("CondDelay"),
+    CONDITION_DISTANCE: MissionCommand("CondDist"),
+    CONDITION_YAW: MissionCommand("CondYaw", _turn),
+    CHANGE_SPEED: MissionCommand("ChangeSpeed", _change_speed),
+    SET_HOME: MissionCommand("SetHome", _set_home, placed=True),
+    JUMP: MissionCommand("Jump"),
+    SET_REVERSE: MissionCommand("SetReverse", _reverse),
+    JUMP_TAG: MissionCommand("Tag", silent=True),
+    LAND_START: MissionCommand("LandStart", keeps_frame=True),
 }
 """Items of the core."""
 
 
-def act(vehicle: Vehicle, item: MissionItem) -> None:
+def act(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute an item that does not navigate; one without an action only marks a place."""
     known = build_of(vehicle).items.get(item.command)
     if known is not None and known.act is not None:
@@ -244,13 +244,13 @@ UNSTATED = -1.0
 """Hour, minute or second of NAV_DELAY that is not stated."""
 
 
-def leg_of_feature(vehicle: Vehicle, item: MissionItem) -> Leg | None:
+def leg_of_feature(vehicle: AutopilotVehicle, item: MissionItem) -> Leg | None:
     """Return the leg of an item of a feature; ``None``: it is one of the core."""
     known = build_of(vehicle).items.get(item.command)
     return known.leg(vehicle, item) if known is not None and known.leg is not None else None
 
 
-def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+def leg_of_copter(vehicle: AutopilotVehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of an item. A delay without a duration lasts until a time of day."""
     stated = leg_of_feature(vehicle, item)
     if stated is not None:
@@ -267,12 +267,12 @@ def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     return leg
 
 
-def path_jerk(vehicle: Vehicle) -> float:
+def path_jerk(vehicle: AutopilotVehicle) -> float:
     """Return the jerk of ways between waypoints [m/s^3]."""
     return max(LEAST_JERK, vehicle.parameters["WPNAV_JERK"])
 
 
-def _not_before(leg: Leg, vehicle: Vehicle, length: float) -> Leg:
+def _not_before(leg: Leg, vehicle: AutopilotVehicle, length: float) -> Leg:
     """Return a leg that takes at least the time for its *length* [m] from rest to rest within WPNAV_JERK.
 
     A waypoint within the waypoint radius takes a moment, too, as ArduCopter's path of limited jerk does.
@@ -282,7 +282,7 @@ def _not_before(leg: Leg, vehicle: Vehicle, length: float) -> Leg:
     return replace(leg, done=lambda: vehicle.kernel.now() >= earliest and done())
 
 
-def _seconds_until(vehicle: Vehicle, item: MissionItem) -> float:
+def _seconds_until(vehicle: AutopilotVehicle, item: MissionItem) -> float:
     """Return the time [s] until hour, minute and second of UTC, the first of them that is not -1 onwards.
 
     The time of day comes next: on the next day, in the next hour or in the next minute, if it has passed.
@@ -295,19 +295,19 @@ def _seconds_until(vehicle: Vehicle, item: MissionItem) -> float:
     return 0.0
 
 
-def leaves_ground(vehicle: Vehicle) -> bool:
+def leaves_ground(vehicle: AutopilotVehicle) -> bool:
     """Return whether AUTO takes off without MISSION_START: raised throttle or bit 1 of AUTO_OPTIONS."""
     raised = vehicle.tuning.sticks.read(vehicle.rc).throttle > 0.0
     return raised or bool(round(vehicle.parameters["AUTO_OPTIONS"]) & 2)
 
 
-def runs(vehicle: Vehicle) -> bool:
+def runs(vehicle: AutopilotVehicle) -> bool:
     """Return whether the mission is being flown."""
     plan = vehicle.mission
     return vehicle.armed and vehicle.mode.name in MISSION_MODES and plan.current > 0 and not plan.complete
 
 
-def copter_ended(vehicle: Vehicle) -> Manoeuvre | None:
+def copter_ended(vehicle: AutopilotVehicle) -> FlightManoeuvre | None:
     """Disarm on the ground; hold the position in the air."""
     if vehicle.landed and vehicle.armed:
         disarm(vehicle, force=True)
@@ -319,20 +319,20 @@ DONE_MODES = {2: 1, 3: 0}
 """MIS_DONE_BEHAVE to the number of the mode that is entered: ACRO, MANUAL."""
 
 
-def _leave(vehicle: Vehicle, mode: int) -> None:
+def _leave(vehicle: AutopilotVehicle, mode: int) -> None:
     change_mode(vehicle, mode)
 
 
-def rover_ended(vehicle: Vehicle) -> Manoeuvre | None:
+def rover_ended(vehicle: AutopilotVehicle) -> FlightManoeuvre | None:
     """Report the end, and stop, loiter or change the mode as MIS_DONE_BEHAVE demands."""
     vehicle.send_text(NOTICE, "Mission Complete")
     after = round(vehicle.parameters["MIS_DONE_BEHAVE"])
     if after in DONE_MODES:
         vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _leave(vehicle, DONE_MODES[after]))
-    return HoldPlace(vehicle) if after == DONE_LOITER else Stand(vehicle)
+    return RoverHold(vehicle) if after == DONE_LOITER else Stand(vehicle)
 
 
-def _rules(ended: Callable[[Vehicle], Manoeuvre | None]) -> MissionRules:
+def _rules(ended: Callable[[AutopilotVehicle], FlightManoeuvre | None]) -> MissionRules:
     return MissionRules(
         restarts=True,
         item_begins=item_begins,
@@ -349,6 +349,6 @@ COPTER_MISSION = _rules(copter_ended)
 ROVER_MISSION = _rules(rover_ended)
 
 
-def fly_mission(vehicle: Vehicle) -> FlyMission:
+def fly_mission(vehicle: AutopilotVehicle) -> FlyMission:
     """Return the manoeuvre of the modes of a copter that fly the mission."""
     return FlyMission(vehicle, leg_of_copter, COPTER_MISSION, leaves_ground)

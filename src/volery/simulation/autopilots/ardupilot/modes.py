@@ -12,12 +12,12 @@ from functools import partial
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.battery import left_mah
-from volery.simulation.autopilots.ardupilot.feature import Check, Kept, build_of
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Kept, build_of
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import FIX_3D, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import FIX_3D, AutopilotVehicle, Mode
 from volery.trace.events import CRITICAL, INFO, NOTICE, WARNING
 
 FORCE, SKIP_CHECKS = 21_196, 2_989
@@ -50,7 +50,7 @@ reports_of = Kept(Reports)
 
 
 @dataclass
-class Received:
+class ReceivedCommands:
     """What has been received since boot."""
 
     station_at: Ns = NEVER
@@ -59,50 +59,50 @@ class Received:
     """Whether a transmitter or overrides have been received."""
 
 
-received_of = Kept(Received)
+received_of = Kept(ReceivedCommands)
 
 
-def between_uptimes(start: float, end: float) -> Callable[[Vehicle], bool]:
+def between_uptimes(start: float, end: float) -> Callable[[AutopilotVehicle], bool]:
     """Return a check that fails between two uptimes [s]."""
     first, last = int(start * S), int(end * S)
     return lambda vehicle: first <= vehicle.uptime() < last
 
 
-def in_position_modes(start: float, end: float) -> Callable[[Vehicle], bool]:
+def in_position_modes(start: float, end: float) -> Callable[[AutopilotVehicle], bool]:
     """Return a check that fails between two uptimes [s] in modes that need a position."""
     within = between_uptimes(start, end)
     return lambda vehicle: vehicle.mode.needs_position and within(vehicle)
 
 
-def in_other_modes(start: float, end: float) -> Callable[[Vehicle], bool]:
+def in_other_modes(start: float, end: float) -> Callable[[AutopilotVehicle], bool]:
     """Return a check that fails between two uptimes [s] in modes that need no position."""
     within = between_uptimes(start, end)
     return lambda vehicle: not vehicle.mode.needs_position and within(vehicle)
 
 
-def lost_position(vehicle: Vehicle) -> bool:
+def lost_position(vehicle: AutopilotVehicle) -> bool:
     """Return whether the mode needs a position, an origin is set, but there is no position."""
     settled = vehicle.uptime() >= vehicle.rules.startup.origin_after
     return vehicle.mode.needs_position and settled and not vehicle.has_position
 
 
-def bad_fix(vehicle: Vehicle) -> bool:
+def bad_fix(vehicle: AutopilotVehicle) -> bool:
     """Return whether there is a receiver of satellites that has no fix now."""
     known = vehicle.uptime() >= vehicle.rules.startup.position_after and vehicle.parameters["GPS_TYPE"] != 0.0
     return known and vehicle.estimate.fix_type < FIX_3D
 
 
-def no_mission(vehicle: Vehicle) -> bool:
+def no_mission(vehicle: AutopilotVehicle) -> bool:
     """Return whether the mode is AUTO without a mission."""
     return vehicle.mode.name == "AUTO" and len(vehicle.mission) <= 1
 
 
-def first_of(texts: Sequence[str], problem: Callable[[Vehicle], str]) -> tuple[Check, ...]:
+def first_of(texts: Sequence[str], problem: Callable[[AutopilotVehicle], str]) -> tuple[ArmingCheck, ...]:
     """Return checks of which at most one fails: that with the text which *problem* returns."""
-    return tuple(Check(text, partial(_is_problem, text=text, problem=problem)) for text in texts)
+    return tuple(ArmingCheck(text, partial(_is_problem, text=text, problem=problem)) for text in texts)
 
 
-def _is_problem(vehicle: Vehicle, text: str, problem: Callable[[Vehicle], str]) -> bool:
+def _is_problem(vehicle: AutopilotVehicle, text: str, problem: Callable[[AutopilotVehicle], str]) -> bool:
     return problem(vehicle) == text
 
 
@@ -118,7 +118,7 @@ _BATTERY_TEXTS = (
 )
 
 
-def _battery_problem(vehicle: Vehicle) -> str:
+def _battery_problem(vehicle: AutopilotVehicle) -> str:
     """Return the first check of the battery that fails (AP_BattMonitor_Backend::arming_checks), or ""."""
     p, volts, charge = vehicle.parameters, vehicle.estimate.battery_volts, left_mah(vehicle)
     low, critical = p["BATT_LOW_VOLT"], p["BATT_CRT_VOLT"]
@@ -138,10 +138,10 @@ def _battery_problem(vehicle: Vehicle) -> str:
 
 SHARED_CHECKS = (
     *first_of(_BATTERY_TEXTS, _battery_problem),
-    Check("Need Position Estimate", lambda vehicle: lost_position(vehicle) and not bad_fix(vehicle)),
-    Check("Mode requires mission", no_mission),
-    Check("GPS 1: Bad fix", lambda vehicle: vehicle.mode.needs_position and bad_fix(vehicle)),
-    Check("Radio failsafe on", lambda vehicle: "radio" in vehicle.failsafes.active),
+    ArmingCheck("Need Position Estimate", lambda vehicle: lost_position(vehicle) and not bad_fix(vehicle)),
+    ArmingCheck("Mode requires mission", no_mission),
+    ArmingCheck("GPS 1: Bad fix", lambda vehicle: vehicle.mode.needs_position and bad_fix(vehicle)),
+    ArmingCheck("Radio failsafe on", lambda vehicle: "radio" in vehicle.failsafes.active),
 )
 """The last checks of copter and rover."""
 
@@ -151,7 +151,7 @@ RESTS_AT_MIDDLE = 1 << 0
 """Bit of PILOT_THR_BHV, of a copter."""
 
 
-def sticks_not_neutral(vehicle: Vehicle, *, by_rudder: bool) -> list[str]:
+def sticks_not_neutral(vehicle: AutopilotVehicle, *, by_rudder: bool) -> list[str]:
     """Return the texts of the sticks that are not at rest, which arming requires while there is a receiver.
 
     Args:
@@ -180,7 +180,7 @@ def sticks_not_neutral(vehicle: Vehicle, *, by_rudder: bool) -> list[str]:
     return [f"{name} (RC{channel}) is not neutral" for name, channel, deflection in found if deflection]
 
 
-def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
+def failing_prearm_checks(vehicle: AutopilotVehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail, in the firmware's order."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:
         return []
@@ -189,7 +189,7 @@ def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     return found + [text for problems in build.problems for text in problems(vehicle)]
 
 
-def mode_not_armable(vehicle: Vehicle) -> list[str]:
+def mode_not_armable(vehicle: AutopilotVehicle) -> list[str]:
     """Return the text that refuses the mode itself, if it does; a copter names the mode, a rover does not."""
     if vehicle.mode.armable:
         return []
@@ -197,7 +197,7 @@ def mode_not_armable(vehicle: Vehicle) -> list[str]:
     return [name]
 
 
-def arm(vehicle: Vehicle, *, force: bool = False, by_rudder: bool = False) -> int:
+def arm(vehicle: AutopilotVehicle, *, force: bool = False, by_rudder: bool = False) -> int:
     """Arm if no check forbids it, and return a MAV_RESULT.
 
     Args:
@@ -221,7 +221,7 @@ def arm(vehicle: Vehicle, *, force: bool = False, by_rudder: bool = False) -> in
     return ACCEPTED
 
 
-def disarm(vehicle: Vehicle, *, force: bool) -> int:
+def disarm(vehicle: AutopilotVehicle, *, force: bool) -> int:
     """Disarm, in flight only by force, and return a MAV_RESULT. The mission begins anew then.
 
     A rover in AUTO keeps its item; a copter stores its hover throttle.
@@ -239,7 +239,7 @@ def disarm(vehicle: Vehicle, *, force: bool) -> int:
     return ACCEPTED
 
 
-def update_prearm_state(vehicle: Vehicle) -> None:
+def update_prearm_state(vehicle: AutopilotVehicle) -> None:
     """Evaluate the pre-arm checks; report those that fail every 30 s, and once they have begun to fail."""
     if vehicle.armed:
         vehicle.arming.checks_passed = True
@@ -287,14 +287,14 @@ RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
 LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
 
 
-def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
+def set_mode(vehicle: AutopilotVehicle, base_mode: int, number: int) -> int:
     """Handle SET_MODE and DO_SET_MODE, and return a MAV_RESULT."""
     if not base_mode & CUSTOM_MODE_ENABLED:
         return DENIED
     return ACCEPTED if change_mode(vehicle, number) else FAILED
 
 
-def change_mode(vehicle: Vehicle, number: int) -> bool:
+def change_mode(vehicle: AutopilotVehicle, number: int) -> bool:
     """Enter a mode if that is possible; otherwise report the reason. Return whether the mode is flown."""
     mode = vehicle.rules.modes.get(number)
     if mode is None and vehicle.flies and number in WITHOUT_EFFECT:
@@ -310,7 +310,7 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
     return enter(vehicle, mode) if entry is None else entry(vehicle, mode)
 
 
-def enter(vehicle: Vehicle, mode: Mode, problem: str = "") -> bool:
+def enter(vehicle: AutopilotVehicle, mode: Mode, problem: str = "") -> bool:
     """Enter a mode unless the vehicle may not; then report the reason. Return whether the mode is flown.
 
     Args:
@@ -331,7 +331,7 @@ def enter(vehicle: Vehicle, mode: Mode, problem: str = "") -> bool:
     return True
 
 
-def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
+def _not_set_up(vehicle: AutopilotVehicle, mode: Mode) -> str:
     """Return why a vehicle may not enter a mode, armed or not, or an empty text."""
     if mode.name == "SMART_RTL" and not vehicle.ground.track:
         return "init failed"
@@ -341,7 +341,7 @@ def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
     return ""
 
 
-def refusal(vehicle: Vehicle, mode: Mode) -> str:
+def refusal(vehicle: AutopilotVehicle, mode: Mode) -> str:
     """Return why an armed vehicle may not enter a mode, or an empty text."""
     if mode.needs_position and not vehicle.has_position:
         return "requires position"
@@ -352,7 +352,7 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
     return ""
 
 
-def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
+def _refusal_on_ground(vehicle: AutopilotVehicle, mode: Mode) -> str:
     if mode.name in MISSION_MODES and not _takes_off_first(vehicle):
         vehicle.send_text(CRITICAL, "Auto: Missing Takeoff Cmd")
         return "init failed"
@@ -361,7 +361,7 @@ def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
     return ""
 
 
-def _takes_off_first(vehicle: Vehicle) -> bool:
+def _takes_off_first(vehicle: AutopilotVehicle) -> bool:
     """Return whether the first item that navigates, except for delays, is a take-off."""
     plan = vehicle.mission
     ahead = (item for item in plan.items[max(1, plan.current) :] if item.navigates and item.command != DELAY)

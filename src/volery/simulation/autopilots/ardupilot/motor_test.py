@@ -19,7 +19,7 @@ from volery.simulation.autopilots.autopilot_parameters import single
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import OFF, Vehicle
+from volery.simulation.autopilots.vehicle_state import OFF, AutopilotVehicle
 from volery.simulation.world.body_specs import FRAMES, Multirotor
 from volery.trace.events import CRITICAL, INFO
 
@@ -58,12 +58,12 @@ class MotorTestState:
 test_of = Kept(MotorTestState)
 
 
-def _refused(vehicle: Vehicle, text: str) -> int:
+def _refused(vehicle: AutopilotVehicle, text: str) -> int:
     vehicle.send_text(CRITICAL, f"Motor Test: {text}")
     return FAILED
 
 
-def on_copter_test(vehicle: Vehicle, command: Command) -> int:
+def on_copter_test(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_MOTOR_TEST of a copter.
 
     param1 is the first motor in the order of the test, param2 the kind of param3, param4 the seconds of each
@@ -82,7 +82,7 @@ def on_copter_test(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_rover_test(vehicle: Vehicle, command: Command) -> int:
+def on_rover_test(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_MOTOR_TEST of a rover: param1 is the output, the others are as for a copter."""
     test, kind, value = test_of(vehicle), round(command.param2), command.param3
     if not test.running:
@@ -100,7 +100,7 @@ def on_rover_test(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def _start(vehicle: Vehicle, command: Command, longest: float) -> None:
+def _start(vehicle: AutopilotVehicle, command: Command, longest: float) -> None:
     test = test_of(vehicle)
     seconds = command.param4 if isfinite(command.param4) else 0.0
     test.running, test.since = True, vehicle.kernel.now()
@@ -109,7 +109,7 @@ def _start(vehicle: Vehicle, command: Command, longest: float) -> None:
     test.motor, test.kind, test.value = round(command.param1), round(command.param2), command.param3
 
 
-def _pulse(vehicle: Vehicle, test: MotorTestState) -> float | None:
+def _pulse(vehicle: AutopilotVehicle, test: MotorTestState) -> float | None:
     """Return the pulse width of the motor [us], or ``None`` if the test cannot go on."""
     if test.kind == PULSE:
         pulse = float(int(test.value))
@@ -123,7 +123,7 @@ def _pulse(vehicle: Vehicle, test: MotorTestState) -> float | None:
     return pulse if SHORTEST_PULSE <= pulse <= LONGEST_PULSE else None
 
 
-def _order(vehicle: Vehicle) -> Sequence[int]:
+def _order(vehicle: AutopilotVehicle) -> Sequence[int]:
     """Return the motors in the order of the test, from 0."""
     spec = vehicle.flight.spec
     if isinstance(spec, Multirotor) and spec.frame:
@@ -132,11 +132,11 @@ def _order(vehicle: Vehicle) -> Sequence[int]:
     return ORDER_OF_PLUS if round(vehicle.parameters["FRAME_TYPE"]) == PLUS else ORDER
 
 
-def _end(vehicle: Vehicle) -> None:
+def _end(vehicle: AutopilotVehicle) -> None:
     test_of(vehicle).running = conditions_of(vehicle).suspended = False
 
 
-def turn_tested_motor(vehicle: Vehicle) -> None:
+def turn_tested_motor(vehicle: AutopilotVehicle) -> None:
     """Turn the motor whose test it is, at each tick."""
     test, now = test_of(vehicle), vehicle.kernel.now()
     if not test.running:
@@ -163,7 +163,7 @@ def turn_tested_motor(vehicle: Vehicle) -> None:
         vehicle.drive(OFF)
 
 
-def drive_tested_output(vehicle: Vehicle) -> None:
+def drive_tested_output(vehicle: AutopilotVehicle) -> None:
     """Drive the output whose test it is, at each tick."""
     test = test_of(vehicle)
     if not test.running:
@@ -178,7 +178,7 @@ def drive_tested_output(vehicle: Vehicle) -> None:
         vehicle.drive(Setpoint(Control.STEER, throttle=share))
 
 
-def _share_of_rover(vehicle: Vehicle, test: MotorTestState) -> float | None:
+def _share_of_rover(vehicle: AutopilotVehicle, test: MotorTestState) -> float | None:
     """Return throttle or steering -1..1, or ``None`` if the rover has no such output."""
     if test.motor not in (THROTTLE, STEERING):
         return None

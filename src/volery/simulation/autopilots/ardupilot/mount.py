@@ -20,7 +20,7 @@ from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import Fields, boot_ms
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 SERVO = 1
 """MNT1_TYPE."""
@@ -68,13 +68,13 @@ class MountState:
 mount_state = Kept(MountState)
 
 
-def mount_of(vehicle: Vehicle) -> MountState | None:
+def mount_of(vehicle: AutopilotVehicle) -> MountState | None:
     """Return the mount, or ``None`` if the vehicle has booted without one."""
     mount = mount_state(vehicle)
     return mount if mount.present else None
 
 
-def limits(vehicle: Vehicle, axis: str) -> tuple[float, float]:
+def limits(vehicle: AutopilotVehicle, axis: str) -> tuple[float, float]:
     """Return the ends [degrees] of an axis: ROLL, PITCH or YAW."""
     return vehicle.parameters[f"MNT1_{axis}_MIN"], vehicle.parameters[f"MNT1_{axis}_MAX"]
 
@@ -83,13 +83,13 @@ def _within(value: float, ends: tuple[float, float]) -> float:
     return max(ends[0], min(ends[1], value))
 
 
-def pans(vehicle: Vehicle) -> bool:
+def pans(vehicle: AutopilotVehicle) -> bool:
     """Return whether the mount turns about the vertical: if not, a copter turns its nose."""
     low, high = limits(vehicle, "YAW")
     return mount_state(vehicle).present is True and bool(channels(vehicle, PAN)) and low < high
 
 
-def set_mount_mode(vehicle: Vehicle, mode: int) -> bool:
+def set_mount_mode(vehicle: AutopilotVehicle, mode: int) -> bool:
     """Set the MAV_MOUNT_MODE and return whether there is such a mode."""
     valid = RETRACT <= mode <= AT_HOME
     if valid:
@@ -97,12 +97,14 @@ def set_mount_mode(vehicle: Vehicle, mode: int) -> bool:
     return valid
 
 
-def set_default_mode(vehicle: Vehicle) -> None:
+def set_default_mode(vehicle: AutopilotVehicle) -> None:
     """Set the mode that MNT1_DEFLT_MODE names."""
     set_mount_mode(vehicle, round(vehicle.parameters["MNT1_DEFLT_MODE"]))
 
 
-def point_by_angles(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, from_north: bool) -> None:
+def point_by_angles(
+    vehicle: AutopilotVehicle, roll: float, pitch: float, yaw: float, *, from_north: bool
+) -> None:
     """Point to angles [degrees], within the ends of the axes; the yaw from north has none."""
     mount = mount_state(vehicle)
     if not from_north:
@@ -112,14 +114,16 @@ def point_by_angles(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, 
     mount.rates, mount.mode = None, BY_MESSAGE
 
 
-def point_by_rates(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, from_north: bool) -> None:
+def point_by_rates(
+    vehicle: AutopilotVehicle, roll: float, pitch: float, yaw: float, *, from_north: bool
+) -> None:
     """Turn at rates [degrees/s]."""
     mount = mount_state(vehicle)
     mount.rates, mount.rates_from_north = (radians(roll), radians(pitch), radians(yaw)), from_north
     mount.mode = BY_MESSAGE
 
 
-def point_at(vehicle: Vehicle, place: Vector | None) -> None:
+def point_at(vehicle: AutopilotVehicle, place: Vector | None) -> None:
     """Point the mount at a place north, east, down [m], or no longer at one.
 
     The nose of a copter follows the place if the mount does not pan, or if there is none.
@@ -133,7 +137,7 @@ def point_at(vehicle: Vehicle, place: Vector | None) -> None:
         set_default_mode(vehicle)
 
 
-def update_mount(vehicle: Vehicle) -> None:
+def update_mount(vehicle: AutopilotVehicle) -> None:
     """Move the target and the outputs, at each tick."""
     mount = mount_state(vehicle)
     if mount.present is None:
@@ -158,7 +162,7 @@ def update_mount(vehicle: Vehicle) -> None:
             move(vehicle, function, (degrees(angle) - low) / (high - low))
 
 
-def _aim(vehicle: Vehicle, mount: MountState, seconds: float) -> None:
+def _aim(vehicle: AutopilotVehicle, mount: MountState, seconds: float) -> None:
     """Set the target of the modes that have one of their own, and turn it at the rates that are in force."""
     if mount.mode == BY_PILOT:
         _follow_pilot(vehicle, mount)
@@ -175,7 +179,7 @@ def _aim(vehicle: Vehicle, mount: MountState, seconds: float) -> None:
         _turn(vehicle, mount, mount.rates, seconds)
 
 
-def _turn(vehicle: Vehicle, mount: MountState, rates: Vector, seconds: float) -> None:
+def _turn(vehicle: AutopilotVehicle, mount: MountState, rates: Vector, seconds: float) -> None:
     """Turn the target for some seconds, within the ends of the axes."""
     roll, pitch, yaw = mount.angles
     nose = vehicle.estimate.attitude[2]
@@ -190,14 +194,14 @@ def _turn(vehicle: Vehicle, mount: MountState, rates: Vector, seconds: float) ->
     mount.angles = (limited[0], limited[1], wrap(turned[2]) if mount.from_north else limited[2])
 
 
-def _yaw_from_nose(vehicle: Vehicle, mount: MountState) -> float:
+def _yaw_from_nose(vehicle: AutopilotVehicle, mount: MountState) -> float:
     """Return the yaw of the target from the nose [rad], within its ends."""
     yaw = mount.angles[2]
     from_nose = wrap(yaw - vehicle.estimate.attitude[2]) if mount.from_north else yaw
     return radians(_within(degrees(from_nose), limits(vehicle, "YAW")))
 
 
-def _compensated(vehicle: Vehicle, mount: MountState) -> Vector:
+def _compensated(vehicle: AutopilotVehicle, mount: MountState) -> Vector:
     """Return the angles [rad] of the axes at which the camera points at its target as the vehicle leans.
 
     MNT1_LEAD_RLL and MNT1_LEAD_PTCH lead the lean by a time.
@@ -221,14 +225,14 @@ def _compensated(vehicle: Vehicle, mount: MountState) -> Vector:
     )
 
 
-def _pilot_channels(vehicle: Vehicle) -> tuple[int | None, ...]:
+def _pilot_channels(vehicle: AutopilotVehicle) -> tuple[int | None, ...]:
     """Return the channels of the pilot for roll, pitch and yaw."""
     numbers = range(FIRST_SWITCH, len(vehicle.rc.transmitter) + 1)
     options = {round(vehicle.parameters[f"RC{number}_OPTION"]): number for number in reversed(numbers)}
     return tuple(options.get(option) for option in (PILOT_ROLL, PILOT_PITCH, PILOT_YAW))
 
 
-def _notice_pilot(vehicle: Vehicle, mount: MountState) -> None:
+def _notice_pilot(vehicle: AutopilotVehicle, mount: MountState) -> None:
     """Give the mount to the pilot once one of the channels moves."""
     if radio_lost(vehicle):
         return
@@ -243,7 +247,7 @@ def _notice_pilot(vehicle: Vehicle, mount: MountState) -> None:
         mount.pilot_pulses = pulses
 
 
-def _follow_pilot(vehicle: Vehicle, mount: MountState) -> None:
+def _follow_pilot(vehicle: AutopilotVehicle, mount: MountState) -> None:
     """Take angles, or rates where MNT1_RC_RATE is positive, from the channels of the pilot."""
     sticks = [
         channel_range(vehicle.parameters, channel).deflection(vehicle.rc[channel])
@@ -269,7 +273,7 @@ def _follow_pilot(vehicle: Vehicle, mount: MountState) -> None:
     mount.from_north, mount.rates = mount.yaw_locked, None
 
 
-def attitude_status(vehicle: Vehicle) -> Fields | None:
+def attitude_status(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GIMBAL_DEVICE_ATTITUDE_STATUS: roll and pitch about the horizon, yaw from the nose."""
     mount = mount_of(vehicle)
     if mount is None:

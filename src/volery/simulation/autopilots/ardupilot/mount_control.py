@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.commands import is_place
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
+from volery.simulation.autopilots.ardupilot.feature import Feature, MissionCommand, as_command
 from volery.simulation.autopilots.ardupilot.mount import (
     AT_HOME,
     AT_POINT,
@@ -45,7 +45,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     finite,
 )
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import WARNING
 
 ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
@@ -66,7 +66,7 @@ CAPABLE = 0b11 | 1 << 13 | 1 << 16 | 1 << 17
 """Retracts, has a neutral position, inputs of the pilot, points at local and global places."""
 
 
-def on_mount_configure(vehicle: Vehicle, command: Command) -> int:
+def on_mount_configure(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_MOUNT_CONFIGURE: param1 is the mode; one that does not exist is accepted without effect."""
     if mount_of(vehicle) is None:
         return FAILED
@@ -74,7 +74,7 @@ def on_mount_configure(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def _warn(vehicle: Vehicle, text: str) -> int:
+def _warn(vehicle: AutopilotVehicle, text: str) -> int:
     """Send a warning, at most one in 30 s, and return FAILED."""
     mount, now = mount_state(vehicle), vehicle.kernel.now()
     if now - mount.warned_at >= WARNS_EVERY:
@@ -83,7 +83,7 @@ def _warn(vehicle: Vehicle, text: str) -> int:
     return FAILED
 
 
-def on_mount_control(vehicle: Vehicle, command: Command) -> int:
+def on_mount_control(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_MOUNT_CONTROL: param7 is the mode.
 
     Pitch, roll and yaw [degrees] are param1 to param3. A place is param5 and param6 [1/1e7 degree], also in
@@ -107,14 +107,14 @@ def on_mount_control(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def _point_at_place(vehicle: Vehicle, latitude: float, longitude: float, height: float) -> None:
+def _point_at_place(vehicle: AutopilotVehicle, latitude: float, longitude: float, height: float) -> None:
     """Point at a place [1/1e7 degree] at a height above home [m]. The nose does not follow it."""
     mount = mount_state(vehicle)
     mount.place = vehicle.point(GLOBAL_RELATIVE, latitude / 1e7, longitude / 1e7, height)
     mount.mode = AT_POINT
 
 
-def on_gimbal_pitchyaw(vehicle: Vehicle, command: Command) -> int:
+def on_gimbal_pitchyaw(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_GIMBAL_MANAGER_PITCHYAW: angles [degrees] param1, param2, or rates param3, param4."""
     if mount_of(vehicle) is None or command.z not in (0.0, 1.0):
         return FAILED
@@ -124,7 +124,9 @@ def on_gimbal_pitchyaw(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if pointed else FAILED
 
 
-def _point(vehicle: Vehicle, flags: int, angles: tuple[float, float], rates: tuple[float, float]) -> bool:
+def _point(
+    vehicle: AutopilotVehicle, flags: int, angles: tuple[float, float], rates: tuple[float, float]
+) -> bool:
     """Follow flags of the gimbal manager, else pitch and yaw [degrees], else their rates.
 
     Angles that are NaN or larger than 90 and 360 degrees are not given.
@@ -141,7 +143,7 @@ def _point(vehicle: Vehicle, flags: int, angles: tuple[float, float], rates: tup
     return True
 
 
-def on_gimbal_configure(vehicle: Vehicle, command: Command) -> int:
+def on_gimbal_configure(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_GIMBAL_MANAGER_CONFIGURE: who is in control, by system and component id."""
     mount, who = mount_of(vehicle), command.param1
     if mount is None or command.z not in (0.0, 1.0):
@@ -160,7 +162,7 @@ def on_gimbal_configure(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_roi_system(vehicle: Vehicle, command: Command) -> int:
+def on_roi_system(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_ROI_SYSID: the mount follows the positions that a system sends."""
     mount = mount_of(vehicle)
     if mount is None:
@@ -169,7 +171,7 @@ def on_roi_system(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_region(vehicle: Vehicle, command: Command) -> int:
+def on_region(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place.
 
     Without a place the nose turns along the path again, also after CONDITION_YAW.
@@ -184,7 +186,7 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_other_position(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle GLOBAL_POSITION_INT of another system: the place that the mount follows."""
     mount = mount_of(vehicle)
     if mount is not None and sender == mount.follows:
@@ -193,7 +195,7 @@ def on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
         )
 
 
-def on_mount_control_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_mount_control_message(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle the deprecated MOUNT_CONTROL: angles [1/100 degree] or a place, as the mode demands."""
     mount = mount_of(vehicle)
     a, b, c = fields["input_a"], fields["input_b"], fields["input_c"]
@@ -205,13 +207,13 @@ def on_mount_control_message(vehicle: Vehicle, fields: dict[str, Any], _sender: 
         _point_at_place(vehicle, a, b, c / 100.0)
 
 
-def on_mount_configure_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_mount_configure_message(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle the deprecated MOUNT_CONFIGURE."""
     if mount_of(vehicle) is not None and fields["target_system"] in (0, vehicle.system):
         set_mount_mode(vehicle, fields["mount_mode"])
 
 
-def retract_by_switch(vehicle: Vehicle, position: int) -> None:
+def retract_by_switch(vehicle: AutopilotVehicle, position: int) -> None:
     """Retract the mount with the switch up, return to its default mode with it down."""
     if position > 0:
         set_mount_mode(vehicle, RETRACT)
@@ -219,12 +221,12 @@ def retract_by_switch(vehicle: Vehicle, position: int) -> None:
         set_default_mode(vehicle)
 
 
-def lock_by_switch(vehicle: Vehicle, position: int) -> None:
+def lock_by_switch(vehicle: AutopilotVehicle, position: int) -> None:
     """Let the pilot's yaw count from north with the switch up."""
     mount_state(vehicle).yaw_locked = position > 0
 
 
-def manager_information(vehicle: Vehicle) -> Fields | None:
+def manager_information(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GIMBAL_MANAGER_INFORMATION."""
     if mount_of(vehicle) is None:
         return None
@@ -237,7 +239,7 @@ def manager_information(vehicle: Vehicle) -> Fields | None:
     return {"time_boot_ms": boot_ms(vehicle), "cap_flags": flags, "gimbal_device_id": 1, **fields}
 
 
-def manager_status(vehicle: Vehicle) -> Fields | None:
+def manager_status(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GIMBAL_MANAGER_STATUS: who is in control."""
     mount = mount_of(vehicle)
     if mount is None:
@@ -254,7 +256,7 @@ def manager_status(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def _leave_to_channel(_vehicle: Vehicle, _position: int) -> None:
+def _leave_to_channel(_vehicle: AutopilotVehicle, _position: int) -> None:
     """Do nothing: the pulse width of the channel counts, not its position as a switch."""
 
 
@@ -294,11 +296,11 @@ COPTER = ROVER = Feature(
         "MOUNT_CONTROL": on_mount_control_message,
     },
     items={
-        ROI_LOCATION: Item("SetROI", as_command(on_region), keeps_frame=True),
-        ROI_NONE: Item("SetROI", as_command(on_region)),
-        ROI: Item("SetROI", as_command(on_region), keeps_frame=True),
-        MOUNT_CONTROL: Item("MountControl", as_command(on_mount_control)),
-        GIMBAL_PITCHYAW: Item("GimbalPitchYaw", as_command(on_gimbal_pitchyaw), silent=True),
+        ROI_LOCATION: MissionCommand("SetROI", as_command(on_region), keeps_frame=True),
+        ROI_NONE: MissionCommand("SetROI", as_command(on_region)),
+        ROI: MissionCommand("SetROI", as_command(on_region), keeps_frame=True),
+        MOUNT_CONTROL: MissionCommand("MountControl", as_command(on_mount_control)),
+        GIMBAL_PITCHYAW: MissionCommand("GimbalPitchYaw", as_command(on_gimbal_pitchyaw), silent=True),
     },
     switches={
         RETRACT_SWITCH: retract_by_switch,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from volery.simulation.autopilots.ardupilot.feature import Feature
-from volery.simulation.autopilots.autopilot_parameters import Parameters
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.autopilot_parameters import VehicleParameters
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 POSITIVE = ("PSC_POSXY_P", "PSC_POSZ_P", "PSC_VELZ_P", "PSC_ACCZ_P", "PSC_ACCZ_I")
 ANGLE_GAINS = ("ATC_ANG_PIT_P", "ATC_ANG_RLL_P", "ATC_ANG_YAW_P")
@@ -84,14 +84,14 @@ COPTER_PARAMETERS = (
 """Parameters of a copter that only these checks read, but for the gains of the yaw rate loop."""
 
 
-def copter_problems(vehicle: Vehicle) -> list[str]:
+def copter_problems(vehicle: AutopilotVehicle) -> list[str]:
     """Return the texts of the parameter checks of a copter that fail."""
-    groups: tuple[Callable[[Parameters], Iterator[str]], ...] = (_settings, _motors)
+    groups: tuple[Callable[[VehicleParameters], Iterator[str]], ...] = (_settings, _motors)
     found = [next(group(vehicle.parameters), "") for group in groups]
     return [*(text for text in found if text), *source_problems(vehicle)]
 
 
-def _settings(p: Parameters) -> Iterator[str]:
+def _settings(p: VehicleParameters) -> Iterator[str]:
     if p["FS_THR_ENABLE"]:
         lowest = p["FS_THR_VALUE"]
         if lowest < NO_SIGNAL_US or p[f"RC{round(p['RCMAP_THROTTLE'])}_MIN"] <= lowest + THROTTLE_GAP_US:
@@ -107,7 +107,7 @@ def _settings(p: Parameters) -> Iterator[str]:
     yield from (f"Bad parameter: {words}" for words in _gains(p))
 
 
-def _gains(p: Parameters) -> Iterator[str]:
+def _gains(p: VehicleParameters) -> Iterator[str]:
     """Return the gains that no loop can have; with a feed-forward the others may be zero."""
     yield from (f"{p.name(name)} must be > 0" for name in (*POSITIVE, *ANGLE_GAINS) if not p[name] > 0.0)
     for loop in RATE_LOOPS:
@@ -120,7 +120,7 @@ def _gains(p: Parameters) -> Iterator[str]:
             yield f"{loop}_D must be >= 0"
 
 
-def _motors(p: Parameters) -> Iterator[str]:
+def _motors(p: VehicleParameters) -> Iterator[str]:
     if p["MOT_SPIN_MIN"] > LARGEST_SPIN_MIN:
         yield f"Motors: MOT_SPIN_MIN too high {p['MOT_SPIN_MIN']:.2f} > {LARGEST_SPIN_MIN}"
     if p["MOT_SPIN_ARM"] > p["MOT_SPIN_MIN"]:
@@ -129,7 +129,7 @@ def _motors(p: Parameters) -> Iterator[str]:
         yield "Motors: Check MOT_PWM_MIN and MOT_PWM_MAX"
 
 
-def source_problems(vehicle: Vehicle) -> list[str]:
+def source_problems(vehicle: AutopilotVehicle) -> list[str]:
     """Return the text of the first source of the estimator that is invalid or has no sensor, if any."""
     p = vehicle.parameters
     required = set()

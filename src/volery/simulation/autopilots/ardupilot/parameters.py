@@ -9,7 +9,7 @@ from math import pi, radians
 
 from volery.base.time import MS, from_seconds
 from volery.simulation.autopilots.ardupilot.feature import ParameterMeanings
-from volery.simulation.autopilots.autopilot_parameters import Parameters, Tuning
+from volery.simulation.autopilots.autopilot_parameters import ManoeuvreTuning, VehicleParameters
 from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 
 _STICKS: ParameterMeanings = {
@@ -176,7 +176,7 @@ SLOWEST = 0.1
 """Speed [m/s] used where a parameter is not positive, as large as the firmware's own lower limits."""
 
 
-def channel_range(parameters: Parameters, channel: int) -> ChannelRange:
+def channel_range(parameters: VehicleParameters, channel: int) -> ChannelRange:
     """Return the calibration of one RC channel."""
     return ChannelRange(
         parameters[f"RC{channel}_MIN"],
@@ -187,13 +187,13 @@ def channel_range(parameters: Parameters, channel: int) -> ChannelRange:
     )
 
 
-def _channel(parameters: Parameters, stick: str, usual: int) -> int:
+def _channel(parameters: VehicleParameters, stick: str, usual: int) -> int:
     """Return the channel of a stick, or the usual one where RCMAP names none that exists."""
     channel = round(parameters[f"RCMAP_{stick}"])
     return channel if 1 <= channel <= CHANNELS else usual
 
 
-def stick_map(parameters: Parameters) -> StickMap:
+def stick_map(parameters: VehicleParameters) -> StickMap:
     """Return which channel is which stick."""
     roll, pitch, throttle, yaw = (
         _channel(parameters, name, usual)
@@ -218,14 +218,14 @@ def _moving(value: float, instead: float = SLOWEST) -> float:
     return min(value, FASTEST) if value > 0.0 else instead
 
 
-def copter_tuning(parameters: Parameters) -> Tuning:
+def copter_tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning of a copter, whose parameters are in cm and 1/100 deg."""
     p = parameters
     speed_down = _moving(p["WPNAV_SPEED_DN"] / 100.0)
     pilot_up = _moving(p["PILOT_SPEED_UP"] / 100.0)
     speed = _moving(p["WPNAV_SPEED"] / 100.0)
     angle = radians(min(80.0, max(10.0, p["ANGLE_MAX"] / 100.0)))
-    return Tuning(
+    return ManoeuvreTuning(
         sticks=stick_map(p),
         speed=speed,
         speed_up=_moving(p["WPNAV_SPEED_UP"] / 100.0),
@@ -272,14 +272,14 @@ def copter_tuning(parameters: Parameters) -> Tuning:
     )
 
 
-def _gps_gate(p: Parameters) -> tuple[float, float, float]:
+def _gps_gate(p: VehicleParameters) -> tuple[float, float, float]:
     """Return gate [sigmas], least sigma and radius of a reset [m]; a radius of 0 lets every fix count."""
     radius = p["EK3_GLITCH_RAD"]
     gate = max(1.0, p["EK3_POS_I_GATE"] / 100.0) if radius > 0.0 else 0.0
     return gate, max(0.1, p["EK3_POSNE_M_NSE"]), radius
 
 
-def _thrust_volts(p: Parameters) -> tuple[float, float]:
+def _thrust_volts(p: VehicleParameters) -> tuple[float, float]:
     """Return full and least voltage of the thrust [V]; 0 where the parameters switch it off."""
     full, least = p["MOT_BAT_VOLT_MAX"], p["MOT_BAT_VOLT_MIN"]
     return (full, least) if full > least else (0.0, 0.0)
@@ -289,11 +289,11 @@ FASTEST_PILOT, LEAST_CRUISE = 30.0, 0.05
 """Largest speed at full stick of a rover [m/s], and least share of the throttle that it is projected from."""
 
 
-def rover_tuning(parameters: Parameters) -> Tuning:
+def rover_tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning of a rover, whose parameters are in m and deg."""
     p = parameters
     speed = _moving(p["WP_SPEED"], _moving(p["CRUISE_SPEED"]))
-    return Tuning(
+    return ManoeuvreTuning(
         sticks=stick_map(p),
         speed=speed,
         accel=_moving(p["ATC_ACCEL_MAX"], 1.0),
@@ -305,7 +305,7 @@ def rover_tuning(parameters: Parameters) -> Tuning:
     )
 
 
-def _pilot_speed(p: Parameters) -> float:
+def _pilot_speed(p: VehicleParameters) -> float:
     """Return a rover's speed at full stick [m/s]: SPEED_MAX, else projected from CRUISE_SPEED."""
     share = p["CRUISE_THROTTLE"] / 100.0
     if not LEAST_CRUISE <= share <= 1.0:

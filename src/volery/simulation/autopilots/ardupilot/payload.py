@@ -10,11 +10,11 @@ from collections.abc import Callable
 from functools import partial
 
 from volery.base.time import MS, S, from_seconds
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
+from volery.simulation.autopilots.ardupilot.feature import Feature, MissionCommand, as_command
 from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO
 
 SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, GRIPPER = 181, 182, 183, 184, 211
@@ -40,7 +40,7 @@ GRIPPER_SWITCH, RELAY_SWITCHES = 19, (28, 34, 35, 36, 66, 67)
 """Values of RCn_OPTION."""
 
 
-def _is_free(vehicle: Vehicle, channel: int, pulse: int) -> bool:
+def _is_free(vehicle: AutopilotVehicle, channel: int, pulse: int) -> bool:
     """Return whether there is such a pulse width [us], and a channel that drives nothing else."""
     function = f"SERVO{channel}_FUNCTION"
     if function not in vehicle.parameters or not 0 <= pulse <= LONGEST_PULSE:
@@ -51,7 +51,7 @@ def _is_free(vehicle: Vehicle, channel: int, pulse: int) -> bool:
     return True
 
 
-def set_servo(vehicle: Vehicle, channel: int, pulse: int) -> bool:
+def set_servo(vehicle: AutopilotVehicle, channel: int, pulse: int) -> bool:
     """Give a channel that drives nothing else a pulse width [us], and return whether there is one."""
     if not _is_free(vehicle, channel, pulse):
         return False
@@ -60,13 +60,13 @@ def set_servo(vehicle: Vehicle, channel: int, pulse: int) -> bool:
     return True
 
 
-def has_relay(vehicle: Vehicle, number: int) -> bool:
+def has_relay(vehicle: AutopilotVehicle, number: int) -> bool:
     """Return whether a pin is assigned to relay *number*, counted from 0."""
     function = f"RELAY{number + 1}_FUNCTION"
     return function in vehicle.parameters and vehicle.parameters[function] == RELAY_FUNCTION
 
 
-def set_relay(vehicle: Vehicle, number: int, state: int) -> bool:
+def set_relay(vehicle: AutopilotVehicle, number: int, state: int) -> bool:
     """Switch a relay and the bit of its pin in SIM_PIN_MASK, and return whether there is one.
 
     Args:
@@ -83,7 +83,7 @@ def set_relay(vehicle: Vehicle, number: int, state: int) -> bool:
     return True
 
 
-def relays_at_boot(vehicle: Vehicle) -> None:
+def relays_at_boot(vehicle: AutopilotVehicle) -> None:
     """Switch each relay as RELAYn_DEFAULT states: 0 off, 1 on; its pin stays as it is for any other value."""
     for number in range(RELAYS):
         default = f"RELAY{number + 1}_DEFAULT"
@@ -91,7 +91,7 @@ def relays_at_boot(vehicle: Vehicle) -> None:
             _write_relay(vehicle, number, vehicle.parameters[default] == 1.0)
 
 
-def _write_relay(vehicle: Vehicle, number: int, on: bool) -> None:
+def _write_relay(vehicle: AutopilotVehicle, number: int, on: bool) -> None:
     relays = outputs_of(vehicle).relays
     (relays.add if on else relays.discard)(number)
     pin = f"RELAY{number + 1}_PIN"
@@ -103,7 +103,7 @@ def _write_relay(vehicle: Vehicle, number: int, on: bool) -> None:
             vehicle.set_parameter("SIM_PIN_MASK", float(changed))
 
 
-def relay_status(vehicle: Vehicle) -> Fields:
+def relay_status(vehicle: AutopilotVehicle) -> Fields:
     """Return RELAY_STATUS."""
     return {
         "time_boot_ms": boot_ms(vehicle),
@@ -112,7 +112,7 @@ def relay_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def move_gripper(vehicle: Vehicle, action: int) -> bool:
+def move_gripper(vehicle: AutopilotVehicle, action: int) -> bool:
     """Grab or release, and return whether there is a gripper and such an action; it needs GRIP_ENABLE."""
     said = {LET_GO: "Gripper load releas", GRAB: "Gripper load grabb"}.get(action)
     if said is None or not vehicle.parameters["GRIP_ENABLE"]:
@@ -129,18 +129,22 @@ def move_gripper(vehicle: Vehicle, action: int) -> bool:
     return True
 
 
-def on_set_servo(vehicle: Vehicle, command: Command) -> int:
+def on_set_servo(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_SERVO."""
     return ACCEPTED if set_servo(vehicle, round(command.param1), round(command.param2)) else FAILED
 
 
-def on_set_relay(vehicle: Vehicle, command: Command) -> int:
+def on_set_relay(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_RELAY."""
     return ACCEPTED if set_relay(vehicle, round(command.param1), round(command.param2)) else FAILED
 
 
 def _repeat(
-    vehicle: Vehicle, output: tuple[str, int], times: float, period: float, change: Callable[[int], None]
+    vehicle: AutopilotVehicle,
+    output: tuple[str, int],
+    times: float,
+    period: float,
+    change: Callable[[int], None],
 ) -> None:
     """Change an output twice in each period, at once for the first time; it replaces an earlier repetition.
 
@@ -172,12 +176,12 @@ def _repeat(
     go_on(2 * round(min(max(times, -1.0), MOST_PERIODS)))
 
 
-def _stop_repeating(vehicle: Vehicle, output: tuple[str, int]) -> None:
+def _stop_repeating(vehicle: AutopilotVehicle, output: tuple[str, int]) -> None:
     if outputs_of(vehicle).repeated == output:
         outputs_of(vehicle).repeated = None
 
 
-def on_repeat_relay(vehicle: Vehicle, command: Command) -> int:
+def on_repeat_relay(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_REPEAT_RELAY: param2 on and off cycles of param3 seconds each."""
     number = round(command.param1)
     if not has_relay(vehicle, number):
@@ -192,7 +196,7 @@ def on_repeat_relay(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_repeat_servo(vehicle: Vehicle, command: Command) -> int:
+def on_repeat_servo(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_REPEAT_SERVO: param3 cycles of param4 seconds between pulse width param2 and the trim."""
     channel, pulse = round(command.param1), round(command.param2)
     if not _is_free(vehicle, channel, pulse):
@@ -206,12 +210,12 @@ def on_repeat_servo(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_gripper(vehicle: Vehicle, command: Command) -> int:
+def on_gripper(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_GRIPPER."""
     return ACCEPTED if move_gripper(vehicle, round(command.param2)) else FAILED
 
 
-def act_on_payload(vehicle: Vehicle, item: MissionItem) -> None:
+def act_on_payload(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute a mission item that switches an output. A gripper item is reported without a gripper, too."""
     if item.command == SET_SERVO:
         set_servo(vehicle, round(item.param1), round(item.param2))
@@ -222,12 +226,12 @@ def act_on_payload(vehicle: Vehicle, item: MissionItem) -> None:
         vehicle.send_text(INFO, "Gripper Grabbed" if round(item.param2) == GRAB else "Gripper Released")
 
 
-def _switch_gripper(vehicle: Vehicle, position: int) -> None:
+def _switch_gripper(vehicle: AutopilotVehicle, position: int) -> None:
     if position:
         move_gripper(vehicle, GRAB if position > 0 else LET_GO)
 
 
-def _switch_relay(vehicle: Vehicle, position: int, number: int) -> None:
+def _switch_relay(vehicle: AutopilotVehicle, position: int, number: int) -> None:
     set_relay(vehicle, number, int(position > 0))
 
 
@@ -253,11 +257,11 @@ COPTER = ROVER = Feature(
         GRIPPER: on_gripper,
     },
     items={
-        SET_RELAY: Item("SetRelay", act_on_payload, silent=True),
-        SET_SERVO: Item("SetServo", act_on_payload, silent=True),
-        GRIPPER: Item("Gripper", act_on_payload, silent=True),
-        REPEAT_RELAY: Item("RepeatRelay", as_command(on_repeat_relay), silent=True),
-        REPEAT_SERVO: Item("RepeatServo", as_command(on_repeat_servo), silent=True),
+        SET_RELAY: MissionCommand("SetRelay", act_on_payload, silent=True),
+        SET_SERVO: MissionCommand("SetServo", act_on_payload, silent=True),
+        GRIPPER: MissionCommand("Gripper", act_on_payload, silent=True),
+        REPEAT_RELAY: MissionCommand("RepeatRelay", as_command(on_repeat_relay), silent=True),
+        REPEAT_SERVO: MissionCommand("RepeatServo", as_command(on_repeat_servo), silent=True),
     },
     switches={
         GRIPPER_SWITCH: _switch_gripper,

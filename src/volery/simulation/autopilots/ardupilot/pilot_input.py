@@ -18,7 +18,7 @@ from volery.simulation.autopilots.ardupilot.feature import Kept
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm, received_of
 from volery.simulation.autopilots.manual_control import ChannelRange
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import WARNING
 
 IGNORE, RELEASE = 65_535, 65_534
@@ -27,7 +27,7 @@ INVALID_AXIS = 32_767
 
 
 @dataclass
-class SwitchState:
+class TransmitterSwitches:
     """Switches of the transmitter, as the firmware has read them. Times in ns."""
 
     mode: int = 0
@@ -51,7 +51,7 @@ class SwitchState:
     """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
 
 
-switches_of = Kept(SwitchState)
+switches_of = Kept(TransmitterSwitches)
 
 
 @dataclass
@@ -71,17 +71,17 @@ class SimulatedFaults:
 faults_of = Kept(SimulatedFaults)
 
 
-def _is_my_station(vehicle: Vehicle, sender: int) -> bool:
+def _is_my_station(vehicle: AutopilotVehicle, sender: int) -> bool:
     return sender == round(vehicle.parameters["SYSID_MYGCS"])
 
 
-def on_heartbeat(vehicle: Vehicle, _fields: dict[str, Any], sender: int) -> None:
+def on_heartbeat(vehicle: AutopilotVehicle, _fields: dict[str, Any], sender: int) -> None:
     """Handle HEARTBEAT."""
     if _is_my_station(vehicle, sender):
         received_of(vehicle).station_at = vehicle.kernel.now()
 
 
-def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_override(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle RC_CHANNELS_OVERRIDE.
 
     Channels 1 to 8: 0 releases, 65535 is ignored. From channel 9: 0 and 65535 are ignored, 65534 releases.
@@ -102,7 +102,7 @@ def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
     sticks_moved(vehicle)
 
 
-def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_manual_control(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle MANUAL_CONTROL: axes -1000..1000 over the whole range of their channels, throttle 0..1000."""
     if not _is_my_station(vehicle, sender) or fields["target"] != vehicle.system:
         return
@@ -135,18 +135,18 @@ def _share(axis: int) -> float | None:
     return min(1.0, max(0.0, (axis + 1000) / 2000.0))
 
 
-def _give(vehicle: Vehicle, channel: int, travel: ChannelRange, share: float | None) -> None:
+def _give(vehicle: AutopilotVehicle, channel: int, travel: ChannelRange, share: float | None) -> None:
     pulse = 0 if share is None else max(0, travel.pulse(share))
     vehicle.rc.override(channel, pulse, vehicle.kernel.now())
 
 
-def sticks_moved(vehicle: Vehicle) -> None:
+def sticks_moved(vehicle: AutopilotVehicle) -> None:
     """Let a mode that the pilot flies act at once; other modes act at the next tick."""
     if vehicle.armed and vehicle.mode.pilot:
         vehicle.run_manoeuvre()
 
 
-def on_step(vehicle: Vehicle) -> None:
+def on_step(vehicle: AutopilotVehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
     simulate_rc_failure(vehicle)
     received, faults = received_of(vehicle), faults_of(vehicle)
@@ -164,7 +164,7 @@ OWN_VOLTAGE = 12.6
 """SIM_BATT_VOLTAGE that leaves the battery as it is."""
 
 
-def simulate_faults(vehicle: Vehicle) -> None:
+def simulate_faults(vehicle: AutopilotVehicle) -> None:
     """Inject the faults and the wind that SIM_ parameters name, once after each change; GPS_TYPE 0, too."""
     parameters = vehicle.parameters
     motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
@@ -199,7 +199,7 @@ def simulate_faults(vehicle: Vehicle) -> None:
             vehicle.flight.weaken_motor(motor, min(1.0, max(0.0, wanted[2])) if weak else 1.0)
 
 
-def simulate_push(vehicle: Vehicle) -> None:
+def simulate_push(vehicle: AutopilotVehicle) -> None:
     """Push a copter by SIM_SHOVE_X, _Y and _Z, forward, right, down, for SIM_SHOVE_TIME, then 0."""
     parameters, faults = vehicle.parameters, faults_of(vehicle)
     lasts = round(parameters["SIM_SHOVE_TIME"]) * MS
@@ -218,7 +218,7 @@ def simulate_push(vehicle: Vehicle) -> None:
     vehicle.kernel.call_at(vehicle.kernel.now() + lasts, end)
 
 
-def expire_overrides(vehicle: Vehicle) -> None:
+def expire_overrides(vehicle: AutopilotVehicle) -> None:
     """Release overrides that are older than RC_OVERRIDE_TIME; 0 ignores them, a negative time keeps them."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]
     changed = vehicle.rc.admit(overrides=seconds != 0.0)
@@ -228,7 +228,7 @@ def expire_overrides(vehicle: Vehicle) -> None:
         sticks_moved(vehicle)
 
 
-def simulate_rc_failure(vehicle: Vehicle) -> None:
+def simulate_rc_failure(vehicle: AutopilotVehicle) -> None:
     """Simulate the loss of the transmitter, which reads as a throttle of 950 us, and its end.
 
     It is lost by a fault of the world, or by the values 1 and 2 of SIM_RC_FAIL.
@@ -240,7 +240,7 @@ def simulate_rc_failure(vehicle: Vehicle) -> None:
         vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
 
 
-def _no_pulses(vehicle: Vehicle) -> bool:
+def _no_pulses(vehicle: AutopilotVehicle) -> bool:
     return vehicle.parameters["SIM_RC_FAIL"] == NO_PULSES or vehicle.flight.transmitter_blocked
 
 
@@ -248,7 +248,7 @@ LACKING = 0.3
 """Share of a motor's thrust up to which the copter cannot be held."""
 
 
-def lacks_motor(vehicle: Vehicle) -> bool:
+def lacks_motor(vehicle: AutopilotVehicle) -> bool:
     """Return whether SIM_ENGINE_MUL has taken a motor from a copter.
 
     The original's simulator sets a falling copter level at its first contact, and its landed detector waits
@@ -261,7 +261,7 @@ FULL_STICK_US = 400.0
 """Deflection of the stick from its trim at which the pilot alone steers [us]."""
 
 
-def mix_steering(vehicle: Vehicle) -> None:
+def mix_steering(vehicle: AutopilotVehicle) -> None:
     """Add the pilot's steering to a rover's own in the modes that the autopilot drives, by STICK_MIXING."""
     mixed = 0.0, 0.0
     drives = not vehicle.mode.pilot and vehicle.mode.needs_position
@@ -300,7 +300,7 @@ def position_of(pulse: int) -> int:
     return 1 + sum(pulse > end for end in POSITIONS)
 
 
-def sticks_rest(vehicle: Vehicle) -> bool:
+def sticks_rest(vehicle: AutopilotVehicle) -> bool:
     """Return whether switches and rudder, read again, would have no effect.
 
     So it is while no channel and no parameter has changed, and neither mode switch nor rudder is timed.
@@ -312,18 +312,18 @@ def sticks_rest(vehicle: Vehicle) -> bool:
     return rest
 
 
-def _mode_position(vehicle: Vehicle, channel: str) -> int | None:
+def _mode_position(vehicle: AutopilotVehicle, channel: str) -> int | None:
     """Return the position of the mode switch, or ``None`` if the parameter *channel* names no channel."""
     number = round(vehicle.parameters[channel])
     return position_of(vehicle.rc[number]) if 1 <= number <= len(vehicle.rc.transmitter) else None
 
 
-def keep_mode(vehicle: Vehicle, channel: str) -> None:
+def keep_mode(vehicle: AutopilotVehicle, channel: str) -> None:
     """Count the mode switch as read: a warm vehicle has taken its mode from it before the run."""
     switches_of(vehicle).mode = switches_of(vehicle).read = _mode_position(vehicle, channel) or 0
 
 
-def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
+def read_mode_switch(vehicle: AutopilotVehicle, channel: str, modes: str) -> None:
     """Enter the mode of the switch, after a boot as soon as there is a transmitter, then once it has moved.
 
     Args:
@@ -344,7 +344,7 @@ def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
     change_mode(vehicle, round(vehicle.parameters[f"{modes}{position}"]))
 
 
-def read_rudder(vehicle: Vehicle, hold: Ns) -> None:
+def read_rudder(vehicle: AutopilotVehicle, hold: Ns) -> None:
     """Arm with the yaw stick right and disarm with it left, the throttle closed.
 
     Args:
@@ -371,7 +371,7 @@ def read_rudder(vehicle: Vehicle, hold: Ns) -> None:
         disarm(vehicle, force=False)
 
 
-def keep_track(vehicle: Vehicle) -> None:
+def keep_track(vehicle: AutopilotVehicle) -> None:
     """Add the position of an armed vehicle to its track; a point near an earlier one cuts the loop.
 
     Without a position for 15 s the track ends, and SMART_RTL is refused until the next arming.

@@ -21,7 +21,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.mavlink.messages import to_uint32
 from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL, INFO
 
 COMPANION, IRLOCK, SIMULATED = 1, 2, 4
@@ -68,7 +68,7 @@ class PrecisionState:
 precision_of = Kept(PrecisionState)
 
 
-def _kind(vehicle: Vehicle) -> int:
+def _kind(vehicle: AutopilotVehicle) -> int:
     """Return the type that the vehicle has booted with, 0 without precision landing."""
     state, parameters = precision_of(vehicle), vehicle.parameters
     if state.kind is None:
@@ -76,7 +76,7 @@ def _kind(vehicle: Vehicle) -> int:
     return state.kind
 
 
-def on_landing_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_landing_target(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle LANDING_TARGET: angles, or a position in body axes with its distance."""
     if _kind(vehicle) != COMPANION:
         return
@@ -87,7 +87,7 @@ def on_landing_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
         _measure(vehicle, (fields["x"], fields["y"], fields["z"]), distance)
 
 
-def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
+def _measure(vehicle: AutopilotVehicle, sight: Vector, distance: float) -> None:
     """Take a measurement of the target.
 
     Args:
@@ -114,7 +114,7 @@ def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
     _fuse(vehicle, (here[0] + north, here[1] + east), down, hypot(*estimate.rates))
 
 
-def _fuse(vehicle: Vehicle, place: tuple[float, float], down: float, rate: float) -> None:
+def _fuse(vehicle: AutopilotVehicle, place: tuple[float, float], down: float, rate: float) -> None:
     """Update the target's place by a measurement; the first one begins a search."""
     state, now = precision_of(vehicle), vehicle.kernel.now()
     sigma = down * (0.01 + 0.01 * rate) + 0.02
@@ -137,7 +137,7 @@ def _fuse(vehicle: Vehicle, place: tuple[float, float], down: float, rate: float
     state.acquired = state.acquired or raw
 
 
-def update_target(vehicle: Vehicle) -> None:
+def update_target(vehicle: AutopilotVehicle) -> None:
     """Measure the simulated beacon; begin to believe a target, and lose it."""
     if _kind(vehicle) in (IRLOCK, SIMULATED):
         _see_beacon(vehicle)
@@ -154,7 +154,7 @@ def update_target(vehicle: Vehicle) -> None:
         state.acquired = True
 
 
-def _see_beacon(vehicle: Vehicle) -> None:
+def _see_beacon(vehicle: AutopilotVehicle) -> None:
     """Measure the direction of the beacon that SIM_PLD_ places, within its cylinder."""
     p, estimate = vehicle.parameters, vehicle.estimate
     if not p["SIM_PLD_ENABLE"] or vehicle.home is None:
@@ -167,7 +167,7 @@ def _see_beacon(vehicle: Vehicle) -> None:
         _measure(vehicle, world_to_body(estimate.quaternion, sight), 0.0)
 
 
-def target_place(vehicle: Vehicle) -> Vector:
+def target_place(vehicle: AutopilotVehicle) -> Vector:
     """Return where the copter is to stand: at the target, PLND_LAND_OFS_X ahead and _Y to the right."""
     p, heading = vehicle.parameters, vehicle.estimate.attitude[2]
     ahead, right = p["PLND_LAND_OFS_X"] / 100.0, p["PLND_LAND_OFS_Y"] / 100.0
@@ -176,7 +176,7 @@ def target_place(vehicle: Vehicle) -> Vector:
     return north + off_north, east + off_east, 0.0
 
 
-def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def aim(vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return the set-point of a landing, or of LOITER with the switch up, over the target if one is seen."""
     state, manoeuvre = precision_of(vehicle), vehicle.manoeuvre.flown
     if not state.acquired or vehicle.landed:
@@ -194,7 +194,7 @@ def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     return setpoint
 
 
-def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
+def _descent(vehicle: AutopilotVehicle, place: Vector, rate: float) -> float:
     """Return the rate of descent [m/s] over a target, of a landing that would descend at *rate*."""
     here, farthest = vehicle.estimate.position, vehicle.parameters["PLND_XY_DIST_MAX"]
     if rate <= 0.0:
@@ -208,13 +208,13 @@ def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
     return rate
 
 
-def switch_loiter(vehicle: Vehicle, position: int) -> None:
+def switch_loiter(vehicle: AutopilotVehicle, position: int) -> None:
     """Hold LOITER over the target while the switch is up."""
     if position:
         precision_of(vehicle).loiters = position > 0
 
 
-def precision_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
+def precision_rows(vehicle: AutopilotVehicle) -> tuple[LogRow, ...]:
     """Return PL of the log on board."""
     if not _kind(vehicle):
         return ()

@@ -14,12 +14,12 @@ from typing import Any
 
 from volery.base.elementary import atan2, cos, sin
 from volery.base.time import MS, Ns, S, to_seconds
-from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept, LogForm
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Feature, Kept, LogForm
 from volery.simulation.autopilots.ardupilot.fence_shapes import Level, shapes
 from volery.simulation.autopilots.mavlink.messages import Fields, all_within, boot_ms, to_uint16
 from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 MESSAGES, FENCE = 2, 10
 """PRX1_TYPE: distances come by messages, or the fence is measured."""
@@ -76,7 +76,7 @@ class ProximityState:
 proximity_of = Kept(ProximityState)
 
 
-def update_proximity(vehicle: Vehicle) -> None:
+def update_proximity(vehicle: AutopilotVehicle) -> None:
     """Forget old distances, and measure the fence, at each tick."""
     sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if sensor.kind is None:
@@ -88,7 +88,7 @@ def update_proximity(vehicle: Vehicle) -> None:
             sensor.distances.pop(direction, None)
 
 
-def is_healthy(vehicle: Vehicle) -> bool:
+def is_healthy(vehicle: AutopilotVehicle) -> bool:
     """Return whether there is a proximity sensor, and it measures."""
     sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if sensor.kind == MESSAGES:
@@ -96,23 +96,23 @@ def is_healthy(vehicle: Vehicle) -> bool:
     return sensor.kind == FENCE and any(shape.inside for shape in shapes(vehicle))
 
 
-def is_there(vehicle: Vehicle) -> bool:
+def is_there(vehicle: AutopilotVehicle) -> bool:
     """Return whether the vehicle has booted with a proximity sensor."""
     return proximity_of(vehicle).kind in (MESSAGES, FENCE)
 
 
-def lacks_data(vehicle: Vehicle) -> bool:
+def lacks_data(vehicle: AutopilotVehicle) -> bool:
     """Return whether there is a proximity sensor that does not measure."""
     return is_there(vehicle) and not is_healthy(vehicle)
 
 
-def closest(vehicle: Vehicle) -> tuple[float, float] | None:
+def closest(vehicle: AutopilotVehicle) -> tuple[float, float] | None:
     """Return the least distance [m] and its angle from the nose [degrees]; ``None`` without an obstacle."""
     sensor = proximity_of(vehicle)
     return min(((far, sensor.angles[direction]) for direction, far in sensor.distances.items()), default=None)
 
 
-def upward(vehicle: Vehicle) -> float | None:
+def upward(vehicle: AutopilotVehicle) -> float | None:
     """Return the distance above the vehicle [m]; ``None``: not measured."""
     sensor = proximity_of(vehicle)
     if sensor.kind == FENCE:
@@ -121,7 +121,7 @@ def upward(vehicle: Vehicle) -> float | None:
     return sensor.upward if fresh else None
 
 
-def edges(vehicle: Vehicle) -> list[tuple[Level, Level]]:
+def edges(vehicle: AutopilotVehicle) -> list[tuple[Level, Level]]:
     """Return the boundary about the vehicle: the two ends of each edge, forward and right [m].
 
     A corner lies between two directions at the lesser of their distances; beside the last direction with an
@@ -147,7 +147,7 @@ def _corner(known: dict[int, float], direction: int) -> Level | None:
 # -- measurements
 
 
-def _store(vehicle: Vehicle, direction: int, far: float, angle: float) -> None:
+def _store(vehicle: AutopilotVehicle, direction: int, far: float, angle: float) -> None:
     """Store a distance [m] at an angle from the nose [degrees], and pass it through the low-pass."""
     sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     passed, cutoff = now - sensor.measured_at.get(direction, NEVER), vehicle.parameters["PRX_FILT"]
@@ -160,7 +160,7 @@ def _store(vehicle: Vehicle, direction: int, far: float, angle: float) -> None:
     sensor.measured_at[direction] = now
 
 
-def _measure_fence(vehicle: Vehicle) -> None:
+def _measure_fence(vehicle: AutopilotVehicle) -> None:
     sensor, uploaded = proximity_of(vehicle), shapes(vehicle)
     if not any(shape.inside for shape in uploaded):
         return
@@ -185,13 +185,13 @@ def _direction(angle: float) -> int:
     return int((angle + 22.5) % 360.0 // 45.0)
 
 
-def _is_admitted(vehicle: Vehicle, far: float) -> bool:
+def _is_admitted(vehicle: AutopilotVehicle, far: float) -> bool:
     """Return whether a distance [m] is within PRX1_MIN and PRX1_MAX, of which 0 is no limit."""
     least, largest = vehicle.parameters["PRX1_MIN"], vehicle.parameters["PRX1_MAX"]
     return far >= least and (largest == 0.0 or far <= largest)
 
 
-def _begin(vehicle: Vehicle, stamp: int) -> ProximityState:
+def _begin(vehicle: AutopilotVehicle, stamp: int) -> ProximityState:
     """Note a message; with a new time stamp the distances that were collected before it count from now on."""
     sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if stamp != sensor.stamp or now - sensor.received_at > TOGETHER:
@@ -208,7 +208,7 @@ def _collect(sensor: ProximityState, far: float, angle: float) -> None:
         sensor.collected[direction] = (far, angle)
 
 
-def on_distance_sensor(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_distance_sensor(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle DISTANCE_SENSOR of a direction, or upward."""
     orientation, far = fields["orientation"], fields["current_distance"] / 100.0
     if proximity_of(vehicle).kind != MESSAGES:
@@ -222,7 +222,7 @@ def on_distance_sensor(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -
         proximity_of(vehicle).upward, proximity_of(vehicle).upward_at = far, vehicle.kernel.now()
 
 
-def on_obstacle_distance(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_obstacle_distance(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle OBSTACLE_DISTANCE: distances at equal steps of the angle, the nearest by direction counts."""
     sensor = proximity_of(vehicle)
     offset = fields.get("angle_offset", 0.0)
@@ -246,7 +246,7 @@ def on_obstacle_distance(vehicle: Vehicle, fields: dict[str, Any], _sender: int)
         _store(vehicle, direction, far, angle)
 
 
-def on_obstacle_3d(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_obstacle_3d(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle OBSTACLE_DISTANCE_3D: a point forward, right and down of the vehicle."""
     if proximity_of(vehicle).kind != MESSAGES:
         return
@@ -277,7 +277,7 @@ NO_DATA, GOOD = 1, 2
 """Health in the log."""
 
 
-def log_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
+def log_rows(vehicle: AutopilotVehicle) -> tuple[LogRow, ...]:
     """Return PRX, and with PRX_LOG_RAW also PRXR, while there is a distance; open directions: the range."""
     sensor = proximity_of(vehicle)
     nearest = closest(vehicle)
@@ -296,7 +296,7 @@ def log_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
     return tuple(rows)
 
 
-def reports(vehicle: Vehicle) -> list[Fields]:
+def reports(vehicle: AutopilotVehicle) -> list[Fields]:
     """Return DISTANCE_SENSOR of each direction with a distance, and upward."""
     sensor = proximity_of(vehicle)
     measured = [(direction, direction, sensor.distances[direction]) for direction in sorted(sensor.distances)]
@@ -317,7 +317,7 @@ def reports(vehicle: Vehicle) -> list[Fields]:
     ]
 
 
-def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
+def _amend_status(vehicle: AutopilotVehicle, status: Fields) -> Fields:
     """Return SYS_STATUS with the sensor, if there is one."""
     if not is_there(vehicle):
         return status
@@ -348,7 +348,7 @@ COPTER = ROVER = Feature(
         "OBSTACLE_DISTANCE": on_obstacle_distance,
         "OBSTACLE_DISTANCE_3D": on_obstacle_3d,
     },
-    checks=(Check("PRX1: No Data", lacks_data),),
+    checks=(ArmingCheck("PRX1: No Data", lacks_data),),
     on_tick=update_proximity,
     amends={"SYS_STATUS": _amend_status},
     extends={"DISTANCE_SENSOR": reports},

@@ -13,11 +13,11 @@ from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.ardupilot.fence_points import RALLY, RALLY_POINT
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import WARNING
 
 
-def return_point(vehicle: Vehicle) -> Vector | None:
+def return_point(vehicle: AutopilotVehicle) -> Vector | None:
     """Return the rally point to which the vehicle returns, north, east, down [m]; ``None``: it returns home.
 
     It is the nearest one, within RALLY_LIMIT_KM where that is positive; with RALLY_INCL_HOME only if it is
@@ -39,7 +39,7 @@ def return_point(vehicle: Vehicle) -> Vector | None:
     return None if too_far or home_is_nearer else nearest
 
 
-def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+def on_rally_fetch(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle RALLY_FETCH_POINT, the deprecated form."""
     points, index = vehicle.points.get(RALLY, []), fields["idx"]
     if index >= len(points):
@@ -50,7 +50,7 @@ def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> No
     sender.answer("RALLY_POINT", idx=index, count=round(vehicle.parameters["RALLY_TOTAL"]), **place)
 
 
-def on_rally_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_rally_point(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle RALLY_POINT, the deprecated form: RALLY_TOTAL states the number of points first."""
     points, index = vehicle.points.get(RALLY, []), fields["idx"]
     if index >= vehicle.parameters["RALLY_TOTAL"]:

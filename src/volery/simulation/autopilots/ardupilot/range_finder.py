@@ -15,7 +15,7 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import root_speed
 from volery.simulation.autopilots.mavlink.messages import Fields, boot_ms, to_uint16
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 RANGE_FINDER = 10
 """RCn_OPTION of the range finder."""
@@ -43,7 +43,7 @@ class SurfaceState:
 surface_of = Kept(SurfaceState)
 
 
-def range_below(vehicle: Vehicle) -> float | None:
+def range_below(vehicle: AutopilotVehicle) -> float | None:
     """Return the distance of the ground straight below [m] as measured; ``None``: there is no measurement."""
     p, estimate = vehicle.parameters, vehicle.estimate
     slant = estimate.rangefinder
@@ -55,18 +55,18 @@ def range_below(vehicle: Vehicle) -> float | None:
     return slant * max(0.707, cos(roll) * cos(pitch))
 
 
-def height_above_ground(vehicle: Vehicle) -> float:
+def height_above_ground(vehicle: AutopilotVehicle) -> float:
     """Return the height by the range finder [m], without a measurement that above home."""
     measured = range_below(vehicle)
     return vehicle.height if measured is None else measured
 
 
-def switch_range_finder(vehicle: Vehicle, position: int) -> None:
+def switch_range_finder(vehicle: AutopilotVehicle, position: int) -> None:
     """Use the range finder while the switch is up."""
     surface_of(vehicle).ignored = position <= 0
 
 
-def follow_ground(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+def follow_ground(vehicle: AutopilotVehicle, setpoint: Setpoint) -> Setpoint:
     """Return the set-point of a mode by hand whose target height moves with the ground."""
     state, now = surface_of(vehicle), vehicle.kernel.now()
     off = vehicle.parameters["SURFTRAK_MODE"] != GROUND
@@ -93,7 +93,7 @@ def follow_ground(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     )
 
 
-def _measure(vehicle: Vehicle, passed: float) -> None:
+def _measure(vehicle: AutopilotVehicle, passed: float) -> None:
     """Filter the height of the ground with SURFTRAK_TC; following begins with what is measured first."""
     state, now, measured = surface_of(vehicle), vehicle.kernel.now(), range_below(vehicle)
     if measured is None:
@@ -108,18 +108,18 @@ def _measure(vehicle: Vehicle, passed: float) -> None:
     state.ground += (ground - state.ground) * passed / (passed + constant) if passed else 0.0
 
 
-def _reported(vehicle: Vehicle) -> float | None:
+def _reported(vehicle: AutopilotVehicle) -> float | None:
     """Return the measured distance [m] of a configured range finder while it measures."""
     return vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
 
 
-def rangefinder(vehicle: Vehicle) -> Fields | None:
+def rangefinder(vehicle: AutopilotVehicle) -> Fields | None:
     """Return RANGEFINDER."""
     distance = _reported(vehicle)
     return None if distance is None else {"distance": distance, "voltage": 0.0}
 
 
-def distance_sensor(vehicle: Vehicle) -> Fields | None:
+def distance_sensor(vehicle: AutopilotVehicle) -> Fields | None:
     """Return DISTANCE_SENSOR downwards."""
     distance = _reported(vehicle)
     if distance is None:

@@ -10,7 +10,7 @@ from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import read_switches
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
-from volery.simulation.autopilots.ardupilot.feature import TICK, Check, Feature, build_of
+from volery.simulation.autopilots.ardupilot.feature import TICK, ArmingCheck, Feature, build_of
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
     MESSAGE_HANDLERS,
@@ -47,19 +47,19 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     STANDBY,
     nav_controller,
 )
-from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
-from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.autopilot_parameters import StoredParameter, load
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
-    HoldPlace,
     ReturnAlongTrack,
+    RoverHold,
     Simple,
     Steering,
 )
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, Leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
+    DriveBySticks,
     GuidedRover,
-    Manual,
     ReturnRover,
     Stand,
     rover_leg,
@@ -69,10 +69,10 @@ from volery.simulation.autopilots.mavlink.firmware import LinkStart
 from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import (
+    AutopilotVehicle,
     Mode,
     RcDefaults,
     StartupTimes,
-    Vehicle,
     VehicleRules,
 )
 from volery.trace.events import INFO, WARNING
@@ -98,32 +98,32 @@ OPTION_MODES = {4: 11, 16: 10, 42: 12, 51: 0, 52: 1, 53: 3, 54: 4, 55: 15, 56: 5
 """RCn_OPTION to the number of the mode that its switch enters."""
 
 
-def guided_arrived(vehicle: Vehicle) -> None:
+def guided_arrived(vehicle: AutopilotVehicle) -> None:
     """Report a reached guided target as the firmware does, as mission item 0."""
     vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": 0})
 
 
-def guided_stale(vehicle: Vehicle) -> None:
+def guided_stale(vehicle: AutopilotVehicle) -> None:
     """Report that no target was received for three seconds."""
     vehicle.send_text(WARNING, "target not received last 3secs, stopping")
 
 
-def returned(vehicle: Vehicle) -> None:
+def returned(vehicle: AutopilotVehicle) -> None:
     """Report the end of a return."""
     vehicle.send_text(INFO, "Reached destination")
 
 
-def leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+def leg(vehicle: AutopilotVehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of an item."""
     return mission.leg_of_feature(vehicle, item) or rover_leg(vehicle, item, goes_on)
 
 
 MODES = (
-    Mode(0, "MANUAL", CUSTOM | MANUAL, Manual, pilot=True),
+    Mode(0, "MANUAL", CUSTOM | MANUAL, DriveBySticks, pilot=True),
     Mode(1, "ACRO", CUSTOM | STABILIZED, Steering, STEERED, needs_position=True, pilot=True),
     Mode(3, "STEERING", CUSTOM | STABILIZED, Steering, STEERED, needs_position=True, pilot=True),
     Mode(4, "HOLD", CUSTOM, Stand),
-    Mode(5, "LOITER", AUTO_BITS, HoldPlace, STEERED, needs_position=True),
+    Mode(5, "LOITER", AUTO_BITS, RoverHold, STEERED, needs_position=True),
     Mode(7, "SIMPLE", CUSTOM | MANUAL, Simple, pilot=True),
     Mode(12, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, STEERED, needs_position=True, armable=False),
     Mode(
@@ -156,12 +156,12 @@ MODES = (
 INITIALISING = Mode(16, "INITIALISING", CUSTOM | MANUAL, Stand, armable=False)
 
 CHECKS = (
-    Check("Gyros not healthy", between_uptimes(0.0, 1.85)),
-    Check("Accels inconsistent", between_uptimes(1.85, 11.5)),
-    Check("Gyros inconsistent", between_uptimes(11.5, 22.4)),
-    Check("Compass not healthy", between_uptimes(0.0, 2.4)),
-    Check("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
-    Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
+    ArmingCheck("Gyros not healthy", between_uptimes(0.0, 1.85)),
+    ArmingCheck("Accels inconsistent", between_uptimes(1.85, 11.5)),
+    ArmingCheck("Gyros inconsistent", between_uptimes(11.5, 22.4)),
+    ArmingCheck("Compass not healthy", between_uptimes(0.0, 2.4)),
+    ArmingCheck("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
+    ArmingCheck("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
 )
 
@@ -181,7 +181,7 @@ STREAM_PARAMETERS = {
 """Suffix of the parameter that stores the rate of each MAV_DATA_STREAM."""
 
 
-def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
+def arming_problems(vehicle: AutopilotVehicle, *, by_rudder: bool = False) -> list[str]:
     """Return the texts of all checks that forbid arming now."""
     found = failing_prearm_checks(vehicle) + mode_not_armable(vehicle)
     if found or not vehicle.parameters["ARMING_CHECK"]:
@@ -189,13 +189,13 @@ def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
     return sticks_not_neutral(vehicle, by_rudder=by_rudder)
 
 
-def finish_setup(vehicle: Vehicle) -> None:
+def finish_setup(vehicle: AutopilotVehicle) -> None:
     """Finish the set-up: enter the mode that INITIAL_MODE names."""
     modes = vehicle.rules.modes
     vehicle.enter_mode(modes.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
 
 
-def start_warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: AutopilotVehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
     boot.skip_reports(vehicle)
@@ -203,7 +203,7 @@ def start_warm(vehicle: Vehicle) -> None:
     finish_setup(vehicle)
 
 
-def on_step(vehicle: Vehicle) -> None:
+def on_step(vehicle: AutopilotVehicle) -> None:
     """Read the transmitter, let the features work, and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
@@ -219,7 +219,7 @@ def on_step(vehicle: Vehicle) -> None:
         vehicle.ground.flight_time += TICK
 
 
-def system_status(vehicle: Vehicle) -> int:
+def system_status(vehicle: AutopilotVehicle) -> int:
     """Return the MAV_STATE: failsafe, starting, holding or driving."""
     if vehicle.failsafes.active:
         return CRITICAL
@@ -228,25 +228,25 @@ def system_status(vehicle: Vehicle) -> int:
     return STANDBY if vehicle.mode.name == "HOLD" else ACTIVE
 
 
-def send_banner(vehicle: Vehicle, version: Version) -> None:
+def send_banner(vehicle: AutopilotVehicle, version: ArduPilotVersion) -> None:
     """Send the status texts that follow a parameter list request."""
     send_version(vehicle, "ArduRover", version)
 
 
-def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
+def on_stream_request(vehicle: AutopilotVehicle, index: int, stream: int, rate: int) -> None:
     """Store the requested stream rates in parameters."""
     names = STREAM_PARAMETERS.values() if stream == ALL else [STREAM_PARAMETERS[stream]]
     for name in names:
         vehicle.set_parameter(vehicle.parameters.name(f"SR{index}_{name}"), rate)
 
 
-def navigation(vehicle: Vehicle) -> Fields | None:
+def navigation(vehicle: AutopilotVehicle) -> Fields | None:
     """Return NAV_CONTROLLER_OUTPUT in modes that steer automatically."""
     return nav_controller(vehicle) if vehicle.mode.controls else None
 
 
 @cache
-def parameters() -> tuple[Parameter, ...]:
+def parameters() -> tuple[StoredParameter, ...]:
     """Return the recorded and documented parameters."""
     return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
 
@@ -268,7 +268,7 @@ CORE = Feature(
 """What ArduRover has without features, in every version."""
 
 
-def rover(version: Version, optional: Collection[str]) -> Firmware:
+def rover(version: ArduPilotVersion, optional: Collection[str]) -> Firmware:
     """Return ArduRover in one version, with some features beside those that are on by default."""
     core = replace(
         CORE,

@@ -9,7 +9,7 @@ from volery.simulation.autopilots.ardupilot.battery import MEASURED_AFTER, gauge
 from volery.simulation.autopilots.ardupilot.pilot_input import faults_of
 from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 NO_FIX_AFTER = int(9.64 * S)
 """Uptime [ns] from which the GPS receiver is detected."""
@@ -37,7 +37,7 @@ class Health(NamedTuple):
     estimator_healthy_after: int
 
 
-def is_logging(vehicle: Vehicle) -> bool:
+def is_logging(vehicle: AutopilotVehicle) -> bool:
     """Return whether the log is written: armed, and for 15 s after disarming or a refusal to arm."""
     now = vehicle.kernel.now()
     return (
@@ -45,13 +45,13 @@ def is_logging(vehicle: Vehicle) -> bool:
     )
 
 
-def receiver_is_lost(vehicle: Vehicle) -> bool:
+def receiver_is_lost(vehicle: AutopilotVehicle) -> bool:
     """Return whether no message of a receiver has come for GPS_TIMEOUT_MS of AP_GPS."""
     since = faults_of(vehicle).no_receiver_since
     return since != NEVER and vehicle.kernel.now() - since > 4 * S
 
 
-def sys_status(vehicle: Vehicle, health: Health) -> Fields:
+def sys_status(vehicle: AutopilotVehicle, health: Health) -> Fields:
     """Return SYS_STATUS."""
     age, controls = vehicle.uptime(), vehicle.mode.controls
     present, enabled, healthy = health.present, health.enabled | controls, health.healthy | controls

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 OUTPUTS = range(1, 17)
 
@@ -43,12 +43,12 @@ class OutputState:
 outputs_of = Kept(OutputState)
 
 
-def channels(vehicle: Vehicle, function: int) -> list[int]:
+def channels(vehicle: AutopilotVehicle, function: int) -> list[int]:
     """Return the channels with a function, from 1."""
     return [channel for channel, its in _functions(vehicle).items() if its == function]
 
 
-def _functions(vehicle: Vehicle) -> dict[int, int]:
+def _functions(vehicle: AutopilotVehicle) -> dict[int, int]:
     """Return SERVOn_FUNCTION by channel, without the channels that have none."""
     outputs, parameters = outputs_of(vehicle), vehicle.parameters
     if outputs.functions_at != parameters.changes:
@@ -58,13 +58,13 @@ def _functions(vehicle: Vehicle) -> dict[int, int]:
     return outputs.functions
 
 
-def write(vehicle: Vehicle, function: int, pulse: int) -> None:
+def write(vehicle: AutopilotVehicle, function: int, pulse: int) -> None:
     """Give the channels with a function a pulse width [us]; 0 ends their pulses."""
     for channel in channels(vehicle, function):
         outputs_of(vehicle).servos[channel] = pulse
 
 
-def move(vehicle: Vehicle, function: int, share: float) -> None:
+def move(vehicle: AutopilotVehicle, function: int, share: float) -> None:
     """Move the channels with a function to a share (0..1) of their range."""
     for channel in channels(vehicle, function):
         low, _, high, is_reversed = _travel(vehicle, channel)
@@ -74,26 +74,26 @@ def move(vehicle: Vehicle, function: int, share: float) -> None:
         )
 
 
-def deflect(vehicle: Vehicle, function: int, deflection: float) -> None:
+def deflect(vehicle: AutopilotVehicle, function: int, deflection: float) -> None:
     """Deflect the channels with a function from their middle: -1 and 1 are the ends."""
     for channel in channels(vehicle, function):
         outputs_of(vehicle).servos[channel] = _deflected(vehicle, channel, deflection)
 
 
-def _travel(vehicle: Vehicle, channel: int) -> tuple[int, int, int, bool]:
+def _travel(vehicle: AutopilotVehicle, channel: int) -> tuple[int, int, int, bool]:
     """Return lower end, middle and upper end of a channel [us], and whether it is reversed."""
     parameters = vehicle.parameters
     low, middle, high = (round(parameters[f"SERVO{channel}_{part}"]) for part in ("MIN", "TRIM", "MAX"))
     return low, middle, high, bool(parameters[f"SERVO{channel}_REVERSED"])
 
 
-def _deflected(vehicle: Vehicle, channel: int, deflection: float) -> int:
+def _deflected(vehicle: AutopilotVehicle, channel: int, deflection: float) -> int:
     low, middle, high, is_reversed = _travel(vehicle, channel)
     by = min(1.0, max(-1.0, -deflection if is_reversed else deflection))
     return middle + int(by * (high - middle if by > 0.0 else middle - low))
 
 
-def pass_transmitter_through(vehicle: Vehicle) -> None:
+def pass_transmitter_through(vehicle: AutopilotVehicle) -> None:
     """Set the channels that follow the transmitter, at each tick."""
     for channel, function in _functions(vehicle).items():
         if function == PASSES_OWN_CHANNEL:
@@ -104,7 +104,7 @@ def pass_transmitter_through(vehicle: Vehicle) -> None:
             _pass_scaled(vehicle, channel, function - PASSES_SCALED.start + 1)
 
 
-def _pass_scaled(vehicle: Vehicle, channel: int, source: int) -> None:
+def _pass_scaled(vehicle: AutopilotVehicle, channel: int, source: int) -> None:
     """Follow a channel of the transmitter, scaled; without input keep the last pulse width.
 
     In a failsafe of the radio, an output whose source has its bit in SERVO_RC_FS_MSK goes to its middle.

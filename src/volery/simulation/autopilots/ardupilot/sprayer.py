@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from math import hypot
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, MissionCommand
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move, write
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 DO_SPRAYER, SPRAYER_SWITCH = 216, 15
 """MAV_CMD, and value of RCn_OPTION."""
@@ -42,7 +42,7 @@ class SprayerState:
 sprayer_of = Kept(SprayerState)
 
 
-def run_sprayer(vehicle: Vehicle, on: bool) -> None:
+def run_sprayer(vehicle: AutopilotVehicle, on: bool) -> None:
     """Let the sprayer run or not; it sprays while it runs above SPRAY_SPEED_MIN."""
     sprayer = sprayer_of(vehicle)
     if on == sprayer.running:
@@ -52,19 +52,19 @@ def run_sprayer(vehicle: Vehicle, on: bool) -> None:
         _stop(vehicle)
 
 
-def _stop(vehicle: Vehicle) -> None:
+def _stop(vehicle: AutopilotVehicle) -> None:
     sprayer_of(vehicle).spraying = False
     move(vehicle, PUMP, 0.0)
     move(vehicle, SPINNER, 0.0)
 
 
-def switch_sprayer(vehicle: Vehicle, position: int) -> None:
+def switch_sprayer(vehicle: AutopilotVehicle, position: int) -> None:
     """Run the sprayer with the switch up; while disarmed this tests the pump."""
     run_sprayer(vehicle, position > 0)
     sprayer_of(vehicle).tested = position > 0 and not vehicle.armed
 
 
-def on_sprayer(vehicle: Vehicle, command: Command) -> int:
+def on_sprayer(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SPRAYER: param1 is 1 to run, 0 to stop."""
     if command.param1 not in (0.0, 1.0):
         return FAILED
@@ -72,13 +72,13 @@ def on_sprayer(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def act_on_sprayer(vehicle: Vehicle, item: MissionItem) -> None:
+def act_on_sprayer(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute the mission item DO_SPRAYER."""
     if item.param1 in (0.0, 1.0):
         run_sprayer(vehicle, item.param1 == 1.0)
 
 
-def update_sprayer(vehicle: Vehicle) -> None:
+def update_sprayer(vehicle: AutopilotVehicle) -> None:
     """Set pump and spinner of a sprayer that runs, at each tick."""
     sprayer, parameters = sprayer_of(vehicle), vehicle.parameters
     if not sprayer.running:
@@ -101,7 +101,7 @@ def update_sprayer(vehicle: Vehicle) -> None:
     write(vehicle, SPINNER, round(parameters["SPRAY_SPINNER"]))
 
 
-def _sprays(vehicle: Vehicle, speed: float) -> bool:
+def _sprays(vehicle: AutopilotVehicle, speed: float) -> bool:
     """Return whether it sprays: the speed [m/s] was beyond its limit for long enough."""
     sprayer, now = sprayer_of(vehicle), vehicle.kernel.now()
     fast = 100.0 * speed >= vehicle.parameters["SPRAY_SPEED_MIN"]
@@ -124,7 +124,7 @@ COPTER = ROVER = Feature(
         "SPRAY_SPINNER": ("µs", "pulse width of the spinner"),
     },
     commands={DO_SPRAYER: on_sprayer},
-    items={DO_SPRAYER: Item("Sprayer", act_on_sprayer, silent=True)},
+    items={DO_SPRAYER: MissionCommand("Sprayer", act_on_sprayer, silent=True)},
     switches={SPRAYER_SWITCH: switch_sprayer},
     on_tick=update_sprayer,
 )

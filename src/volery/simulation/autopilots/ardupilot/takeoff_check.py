@@ -11,7 +11,7 @@ from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.mavlink.messages import Fields, to_uint16
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL
 
 TELEMETRY_FROM = 6 * S
@@ -30,17 +30,17 @@ class Warned:
 warned_of = Kept(Warned)
 
 
-def has_speed_telemetry(vehicle: Vehicle) -> bool:
+def has_speed_telemetry(vehicle: AutopilotVehicle) -> bool:
     """Return whether the speed controllers send telemetry."""
     return vehicle.parameters["SIM_ESC_TELEM"] != 0.0 and vehicle.uptime() >= TELEMETRY_FROM
 
 
-def reported_rotor_speed(vehicle: Vehicle) -> float:
+def reported_rotor_speed(vehicle: AutopilotVehicle) -> float:
     """Return the rotor speed that the speed controllers report [1/min]."""
     return max(0.0, vehicle.parameters["SIM_ESC_ARM_RPM"]) if vehicle.armed else 0.0
 
 
-def check_takeoff(vehicle: Vehicle) -> None:
+def check_takeoff(vehicle: AutopilotVehicle) -> None:
     """Block the motors on the ground, or let them come up, at each tick; warn after each five seconds."""
     least, most = vehicle.parameters["TKOFF_RPM_MIN"], vehicle.parameters["TKOFF_RPM_MAX"]
     arming, warned, now = vehicle.arming, warned_of(vehicle), vehicle.kernel.now()
@@ -64,7 +64,7 @@ def check_takeoff(vehicle: Vehicle) -> None:
         vehicle.send_text(CRITICAL, f"Takeoff blocked: {reason}")
 
 
-def esc_telemetry(vehicle: Vehicle) -> Fields | None:
+def esc_telemetry(vehicle: AutopilotVehicle) -> Fields | None:
     """Return ESC_TELEMETRY_1_TO_4 with the constants of the firmware's simulator."""
     if not has_speed_telemetry(vehicle):
         return None

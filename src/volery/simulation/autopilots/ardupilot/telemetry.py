@@ -13,7 +13,7 @@ from volery.base.time import US, S
 from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
 from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
-from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.ardupilot.versions import ArduPilotVersion
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import (
@@ -27,14 +27,14 @@ from volery.simulation.autopilots.mavlink.messages import (
     to_uint32,
 )
 from volery.simulation.autopilots.onboard_mission import OnboardMission
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 GRAVITY_MILLI = 1000.0 / 9.80665
 ZERO_CELSIUS_RISE = 2850
 """Temperature of the recorded boards in flight [cdegC]."""
 
 
-def _has_fix(vehicle: Vehicle) -> bool:
+def _has_fix(vehicle: AutopilotVehicle) -> bool:
     return vehicle.uptime() >= FIX_AFTER
 
 
@@ -43,7 +43,7 @@ def _cm(metres: float) -> int:
     return round(metres * 100.0) * 10
 
 
-def global_position(vehicle: Vehicle) -> Fields:
+def global_position(vehicle: AutopilotVehicle) -> Fields:
     """Return GLOBAL_POSITION_INT, with zeros before the first fix."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "hdg": heading_cdeg(estimate.attitude[2])}
@@ -57,7 +57,7 @@ def global_position(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def local_position(vehicle: Vehicle) -> Fields | None:
+def local_position(vehicle: AutopilotVehicle) -> Fields | None:
     """Return LOCAL_POSITION_NED once there is a position."""
     if vehicle.uptime() < vehicle.rules.startup.local_position_after:
         return None
@@ -69,7 +69,7 @@ def local_position(vehicle: Vehicle) -> Fields | None:
     return {"time_boot_ms": boot_ms(vehicle), "x": x, "y": y, "z": z, "vx": vx, "vy": vy, "vz": vz}
 
 
-def vfr_hud(vehicle: Vehicle) -> Fields:
+def vfr_hud(vehicle: AutopilotVehicle) -> Fields:
     """Return VFR_HUD: without an airspeed sensor the speed is that of the satellites."""
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
@@ -84,7 +84,7 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
     }
 
 
-def _imu(vehicle: Vehicle) -> Fields:
+def _imu(vehicle: AutopilotVehicle) -> Fields:
     estimate = vehicle.estimate
     return {
         "xacc": to_int16(estimate.accel[0] * GRAVITY_MILLI),
@@ -98,29 +98,29 @@ def _imu(vehicle: Vehicle) -> Fields:
     }
 
 
-def _compass(vehicle: Vehicle) -> Fields:
+def _compass(vehicle: AutopilotVehicle) -> Fields:
     if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return {}
     x, y, z = vehicle.estimate.mag
     return {"xmag": to_int16(x * 1000.0), "ymag": to_int16(y * 1000.0), "zmag": to_int16(z * 1000.0)}
 
 
-def raw_imu(vehicle: Vehicle) -> Fields:
+def raw_imu(vehicle: AutopilotVehicle) -> Fields:
     """Return RAW_IMU (milli-g, mrad/s, milligauss)."""
     return {"time_usec": boot_us(vehicle), "id": 0, **_imu(vehicle)}
 
 
-def scaled_imu2(vehicle: Vehicle) -> Fields:
+def scaled_imu2(vehicle: AutopilotVehicle) -> Fields:
     """Return SCALED_IMU2: the second unit measures like the first."""
     return {"time_boot_ms": boot_ms(vehicle), **_imu(vehicle)}
 
 
-def scaled_imu3(vehicle: Vehicle) -> Fields:
+def scaled_imu3(vehicle: AutopilotVehicle) -> Fields:
     """Return SCALED_IMU3: there is no third unit but a third compass."""
     return {"time_boot_ms": boot_ms(vehicle), **_compass(vehicle)}
 
 
-def pressure(vehicle: Vehicle) -> Fields:
+def pressure(vehicle: AutopilotVehicle) -> Fields:
     """Return SCALED_PRESSURE or SCALED_PRESSURE2."""
     return {
         "time_boot_ms": boot_ms(vehicle),
@@ -135,7 +135,7 @@ ACCURACY_WITHOUT_FIX = {"h_acc": 300, "v_acc": 300, "vel_acc": 40}
 """Dilutions [1/100] and accuracies [mm, mm/s] that the receiver of the original's simulator always states."""
 
 
-def gps_raw(vehicle: Vehicle) -> Fields:
+def gps_raw(vehicle: AutopilotVehicle) -> Fields:
     """Return GPS_RAW_INT. Without a fix it still states where it is, like the original's simulator."""
     if vehicle.uptime() < NO_FIX_AFTER:
         return {"eph": 65_535, "epv": 65_535}
@@ -156,7 +156,7 @@ def gps_raw(vehicle: Vehicle) -> Fields:
     }
 
 
-def _gps_without_fix(vehicle: Vehicle) -> Fields:
+def _gps_without_fix(vehicle: AutopilotVehicle) -> Fields:
     truth = vehicle.flight.truth()
     east, north, _ = truth.velocity
     last = boot_us(vehicle) - round(vehicle.estimate.gps_age * 1e6)
@@ -190,13 +190,13 @@ def _gps_speed(north: float, east: float) -> Fields:
     }
 
 
-def system_time(vehicle: Vehicle) -> Fields:
+def system_time(vehicle: AutopilotVehicle) -> Fields:
     """Return SYSTEM_TIME, with satellite time once there is a fix."""
     now = EPOCH_US + vehicle.kernel.now() // US
     return {"time_unix_usec": now if _has_fix(vehicle) else 0, "time_boot_ms": boot_ms(vehicle)}
 
 
-def simstate(vehicle: Vehicle) -> Fields:
+def simstate(vehicle: AutopilotVehicle) -> Fields:
     """Return SIMSTATE: the true state, as sent by ArduPilot's own simulator."""
     truth = vehicle.flight.truth()
     roll, pitch, yaw = quaternion_to_euler(attitude_enu_to_ned(truth.attitude))
@@ -218,12 +218,12 @@ def simstate(vehicle: Vehicle) -> Fields:
     }
 
 
-def ahrs(vehicle: Vehicle) -> Fields:
+def ahrs(vehicle: AutopilotVehicle) -> Fields:
     """Return AHRS: errors of the backup estimator."""
     return {"error_rp": 0.0025, "error_yaw": abs(vehicle.estimate.heading_error)}
 
 
-def ahrs2(vehicle: Vehicle) -> Fields | None:
+def ahrs2(vehicle: AutopilotVehicle) -> Fields | None:
     """Return AHRS2: the backup estimator, here equal to the first."""
     if vehicle.uptime() < 4 * S:
         return None
@@ -236,7 +236,7 @@ def ahrs2(vehicle: Vehicle) -> Fields | None:
     return fields
 
 
-def nav_controller(vehicle: Vehicle) -> Fields:
+def nav_controller(vehicle: AutopilotVehicle) -> Fields:
     """Return NAV_CONTROLLER_OUTPUT."""
     estimate, target = vehicle.estimate, vehicle.manoeuvre.target
     roll, pitch, yaw = estimate.target_attitude
@@ -253,7 +253,7 @@ def nav_controller(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def position_target(vehicle: Vehicle) -> Fields | None:
+def position_target(vehicle: AutopilotVehicle) -> Fields | None:
     """Return POSITION_TARGET_GLOBAL_INT while the vehicle flies to a point."""
     target = vehicle.manoeuvre.target
     if target is None or not vehicle.armed:
@@ -273,7 +273,7 @@ VELOCITY_ONLY = 0b1100_0000_0111
 """``type_mask`` of a velocity and an acceleration: position, yaw and yaw rate are ignored."""
 
 
-def local_target(vehicle: Vehicle) -> Fields | None:
+def local_target(vehicle: AutopilotVehicle) -> Fields | None:
     """Return POSITION_TARGET_LOCAL_NED while the vehicle flies to a point or follows a velocity."""
     manoeuvre = vehicle.manoeuvre.flown
     if not vehicle.armed:
@@ -290,7 +290,7 @@ def local_target(vehicle: Vehicle) -> Fields | None:
     return {**fields, "type_mask": 65_016, "x": x, "y": y, "z": z}
 
 
-def home_position(vehicle: Vehicle) -> Fields | None:
+def home_position(vehicle: AutopilotVehicle) -> Fields | None:
     """Return HOME_POSITION once it is set."""
     home = vehicle.home
     if home is None:
@@ -308,7 +308,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def origin(vehicle: Vehicle) -> Fields | None:
+def origin(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
     if vehicle.home is None or not vehicle.position_ok:
         return None
@@ -332,7 +332,7 @@ TAKING_OFF = constant("MAV_LANDED_STATE_TAKEOFF")
 LANDING = constant("MAV_LANDED_STATE_LANDING")
 
 
-def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
+def heartbeat(vehicle: AutopilotVehicle, kind: int, system_status: int) -> Fields:
     """Return HEARTBEAT of a vehicle of that MAV_TYPE and MAV_STATE."""
     return {
         "type": kind,
@@ -344,7 +344,7 @@ def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
     }
 
 
-def extended_sys_state(vehicle: Vehicle) -> Fields:
+def extended_sys_state(vehicle: AutopilotVehicle) -> Fields:
     """Return EXTENDED_SYS_STATE."""
     if vehicle.landed:
         landed = ON_GROUND
@@ -355,7 +355,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
     return {"vtol_state": 3, "landed_state": landed}
 
 
-def rc_channels(vehicle: Vehicle) -> Fields:
+def rc_channels(vehicle: AutopilotVehicle) -> Fields:
     """Return RC_CHANNELS, including overrides."""
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "chancount": 16, "rssi": 255}
     for number, pulse in enumerate(vehicle.rc.pulses(), start=1):
@@ -363,7 +363,7 @@ def rc_channels(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def rc_channels_raw(vehicle: Vehicle) -> Fields:
+def rc_channels_raw(vehicle: AutopilotVehicle) -> Fields:
     """Return RC_CHANNELS_RAW: the first eight channels."""
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "port": 0, "rssi": 255}
     for number, pulse in enumerate(vehicle.rc.pulses()[:8], start=1):
@@ -371,7 +371,7 @@ def rc_channels_raw(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def rc_channels_scaled(vehicle: Vehicle) -> Fields:
+def rc_channels_scaled(vehicle: AutopilotVehicle) -> Fields:
     """Return RC_CHANNELS_SCALED: steering and throttle outputs in 1/10000."""
     steering, throttle = vehicle.estimate.motors
     return {
@@ -382,7 +382,7 @@ def rc_channels_scaled(vehicle: Vehicle) -> Fields:
     }
 
 
-def servo_output(vehicle: Vehicle) -> Fields:
+def servo_output(vehicle: AutopilotVehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW."""
     return {
         "time_usec": to_uint32(boot_us(vehicle)),
@@ -404,7 +404,7 @@ def _mission_state(plan: OnboardMission) -> int:
     return IN_PROGRESS if plan.current else NOT_STARTED
 
 
-def mission_current(vehicle: Vehicle) -> Fields:
+def mission_current(vehicle: AutopilotVehicle) -> Fields:
     """Return MISSION_CURRENT; the home position is not counted as an item."""
     plan = vehicle.mission
     return {
@@ -421,7 +421,7 @@ WITHOUT_POSITION, WITH_POSITION, STARTING = 167, 831, 1024
 EKF_REPORTS_AFTER, EKF_STARTS_AFTER, EKF_ALIGNED_AFTER = int(3.3 * S), int(5.3 * S), int(5.75 * S)
 
 
-def ekf_status(vehicle: Vehicle) -> Fields | None:
+def ekf_status(vehicle: AutopilotVehicle) -> Fields | None:
     """Return EKF_STATUS_REPORT."""
     age = vehicle.uptime()
     if age < EKF_REPORTS_AFTER:
@@ -439,17 +439,17 @@ def ekf_status(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def vibration(vehicle: Vehicle) -> Fields:
+def vibration(vehicle: AutopilotVehicle) -> Fields:
     """Return VIBRATION: the body model has none."""
     return {"time_usec": boot_us(vehicle), "vibration_x": 0.003, "vibration_y": 0.003, "vibration_z": 0.003}
 
 
-def wind(vehicle: Vehicle) -> Fields | None:
+def wind(vehicle: AutopilotVehicle) -> Fields | None:
     """Return WIND: without an airspeed sensor the firmware estimates none."""
     return {"direction": -180.0, "speed": 0.0, "speed_z": 0.0} if vehicle.has_position else None
 
 
-def terrain_report(vehicle: Vehicle) -> Fields:
+def terrain_report(vehicle: AutopilotVehicle) -> Fields:
     """Return TERRAIN_REPORT: there is no terrain data on board."""
     if vehicle.uptime() < FIX_AFTER:
         return {"spacing": 100, "pending": 56}
@@ -462,24 +462,24 @@ def terrain_report(vehicle: Vehicle) -> Fields:
     }
 
 
-def attitude_target(vehicle: Vehicle) -> Fields:
+def attitude_target(vehicle: AutopilotVehicle) -> Fields:
     """Return ATTITUDE_TARGET of a copter, without body rates."""
     estimate = vehicle.estimate
     q = euler_to_quaternion(*estimate.target_attitude)
     return {"time_boot_ms": boot_ms(vehicle), "q": q, "thrust": estimate.throttle if vehicle.armed else 0.0}
 
 
-def power_status(_vehicle: Vehicle) -> Fields:
+def power_status(_vehicle: AutopilotVehicle) -> Fields:
     """Return POWER_STATUS."""
     return {"Vcc": 5000}
 
 
-def meminfo(_vehicle: Vehicle) -> Fields:
+def meminfo(_vehicle: AutopilotVehicle) -> Fields:
     """Return MEMINFO."""
     return {"brkval": 0, "freemem": 65_535, "freemem32": 131_072}
 
 
-def autopilot_version(version: Version, capabilities: int, board: bytes) -> Fields:
+def autopilot_version(version: ArduPilotVersion, capabilities: int, board: bytes) -> Fields:
     """Return AUTOPILOT_VERSION with the board's serial number."""
     return {
         "capabilities": capabilities,

@@ -15,7 +15,7 @@ from volery.simulation.autopilots.ardupilot.modes import MANUAL_BITS, change_mod
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import BRAKE_ACCEL, root_speed
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import IDLE, OFF, Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, OFF, AutopilotVehicle, FlightManoeuvre, Mode
 from volery.trace.events import INFO
 
 GRAVITY = 9.80665
@@ -41,21 +41,21 @@ THROW = 18
 """Number of the mode."""
 
 
-class _Stage(IntEnum):
+class _ThrowStage(IntEnum):
     DISARMED, DETECTING, SPOOLING, UPRIGHTING, HEIGHT, PLACE = range(6)
 
 
-class Throw(Manoeuvre):
+class Throw(FlightManoeuvre):
     """Wait for the throw, get upright, stop climbing or falling, stop, and enter the next mode.
 
     Args:
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self.starts_at_once = True
-        self._stage = _Stage.DISARMED
+        self._stage = _ThrowStage.DISARMED
         self._falls_since: Ns = NEVER
         self._climb_then = 0.0
         """Climb rate at the first sign of the throw [m/s]."""
@@ -67,7 +67,7 @@ class Throw(Manoeuvre):
     def enter(self) -> None:
         """Begin anew, at entry and when armed; the motors are off unless THROW_MOT_START is 1."""
         self.waiting = IDLE if self.vehicle.parameters["THROW_MOT_START"] == 1.0 else OFF
-        self._stage = _Stage.DISARMED
+        self._stage = _ThrowStage.DISARMED
         self._went_on = False
 
     def _say(self, text: str) -> None:
@@ -75,13 +75,13 @@ class Throw(Manoeuvre):
 
     def takeoff_requested(self) -> bool:
         """Return whether the throw is detected; called at each tick before it."""
-        if self._stage == _Stage.DISARMED:
+        if self._stage == _ThrowStage.DISARMED:
             self._say("waiting for throw")
-            self._stage = _Stage.DETECTING
-        elif self._stage == _Stage.DETECTING and self._is_thrown():
+            self._stage = _ThrowStage.DETECTING
+        elif self._stage == _ThrowStage.DETECTING and self._is_thrown():
             self._say("throw detected - spooling motors")
-            self._stage, self._detected_at = _Stage.SPOOLING, self.vehicle.kernel.now()
-        return self._stage >= _Stage.SPOOLING
+            self._stage, self._detected_at = _ThrowStage.SPOOLING, self.vehicle.kernel.now()
+        return self._stage >= _ThrowStage.SPOOLING
 
     def _is_thrown(self) -> bool:
         vehicle, now = self.vehicle, self.vehicle.kernel.now()
@@ -102,18 +102,18 @@ class Throw(Manoeuvre):
         vehicle, estimate = self.vehicle, self.vehicle.estimate
         roll, pitch, _ = estimate.attitude
         spooled = vehicle.kernel.now() - self._detected_at >= vehicle.rules.arming.spool_up
-        if self._stage == _Stage.SPOOLING and spooled:
+        if self._stage == _ThrowStage.SPOOLING and spooled:
             self._say("throttle is unlimited - uprighting")
-            self._stage = _Stage.UPRIGHTING
-        elif self._stage == _Stage.UPRIGHTING and cos(roll) * cos(pitch) > UPRIGHT:
+            self._stage = _ThrowStage.UPRIGHTING
+        elif self._stage == _ThrowStage.UPRIGHTING and cos(roll) * cos(pitch) > UPRIGHT:
             self._say("uprighted - controlling height")
-            self._stage = _Stage.HEIGHT
+            self._stage = _ThrowStage.HEIGHT
             dropped = vehicle.parameters["THROW_TYPE"] == DROP
             self._down = estimate.position[2] + (BELOW if dropped else -ABOVE)
-        elif self._stage == _Stage.HEIGHT and estimate.position[2] - self._down < NEAR:
+        elif self._stage == _ThrowStage.HEIGHT and estimate.position[2] - self._down < NEAR:
             self._say("height achieved - controlling position")
-            self._stage = _Stage.PLACE
-        elif self._stage == _Stage.PLACE and not self._went_on and self._has_stopped():
+            self._stage = _ThrowStage.PLACE
+        elif self._stage == _ThrowStage.PLACE and not self._went_on and self._has_stopped():
             self._went_on = True
             following = round(vehicle.parameters["THROW_NEXTMODE"])
             if following in NEXT_MODES and change_mode(vehicle, following):
@@ -126,12 +126,12 @@ class Throw(Manoeuvre):
 
     def _setpoint(self) -> Setpoint:
         tuning = self.vehicle.tuning
-        if self._stage <= _Stage.UPRIGHTING:
+        if self._stage <= _ThrowStage.UPRIGHTING:
             return Setpoint(Control.ATTITUDE, throttle=0.5)
         above = self._down - self.vehicle.estimate.position[2]
         climb = -root_speed(above, BRAKE_ACCEL) if above > 0.0 else root_speed(-above, BRAKE_ACCEL)
         climb = min(VERTICAL_SPEED, max(-VERTICAL_SPEED, climb))
-        level = self._stage == _Stage.HEIGHT
+        level = self._stage == _ThrowStage.HEIGHT
         return Setpoint(
             Control.CLIMB if level else Control.VELOCITY,
             velocity=(0.0, 0.0, 0.0 if level else -climb),
@@ -144,7 +144,7 @@ class Throw(Manoeuvre):
         )
 
 
-def _enter_throw(vehicle: Vehicle, mode: Mode) -> bool:
+def _enter_throw(vehicle: AutopilotVehicle, mode: Mode) -> bool:
     return enter(vehicle, mode, "init failed" if vehicle.armed else "")
 
 

@@ -14,14 +14,14 @@ from typing import Any
 from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
 from volery.base.time import Ns, S
-from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
+from volery.simulation.autopilots.ardupilot.feature import ArmingCheck, Feature, Kept
 from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, LEVEL_AND_HEIGHT, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.onboard_mission import GLOBAL
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, Mode
 
 BY_ADSB, BY_POSITION = 0, 1
 """MAV_COLLISION_SRC."""
@@ -92,7 +92,7 @@ class TrafficState:
 traffic_of = Kept(TrafficState)
 
 
-def on_adsb(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_adsb(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle ADSB_VEHICLE."""
     p, address, now = vehicle.parameters, fields["ICAO_address"], vehicle.kernel.now()
     placed = fields["flags"] & VALID_PLACE and (fields["lat"] or fields["lon"])
@@ -108,7 +108,7 @@ def on_adsb(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     _note(vehicle, (BY_ADSB, address), Aircraft(place, velocity, now - fields["tslc"] * S))
 
 
-def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+def on_position(vehicle: AutopilotVehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle GLOBAL_POSITION_INT of another system."""
     if sender != vehicle.system:
         place = vehicle.point(GLOBAL, fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
@@ -116,7 +116,7 @@ def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
         _note(vehicle, (BY_POSITION, sender), Aircraft(place, velocity, vehicle.kernel.now()))
 
 
-def _note(vehicle: Vehicle, key: tuple[int, int], seen: Aircraft) -> None:
+def _note(vehicle: AutopilotVehicle, key: tuple[int, int], seen: Aircraft) -> None:
     """Keep a report; where AVD_OBS_MAX aircraft are known already, in place of the oldest."""
     others = traffic_of(vehicle).others
     if not vehicle.parameters["AVD_ENABLE"]:
@@ -131,7 +131,7 @@ def _note(vehicle: Vehicle, key: tuple[int, int], seen: Aircraft) -> None:
     others[key] = seen
 
 
-def update_traffic(vehicle: Vehicle) -> None:
+def update_traffic(vehicle: AutopilotVehicle) -> None:
     """Find the most serious threat, act on it and report it, at each tick."""
     traffic = traffic_of(vehicle)
     if not vehicle.parameters["AVD_ENABLE"]:
@@ -155,7 +155,7 @@ def update_traffic(vehicle: Vehicle) -> None:
         _report(vehicle, worst, threat)
 
 
-def is_threatened(vehicle: Vehicle) -> bool:
+def is_threatened(vehicle: AutopilotVehicle) -> bool:
     """Return whether avoidance acts on a threat."""
     return traffic_of(vehicle).active
 
@@ -163,7 +163,7 @@ def is_threatened(vehicle: Vehicle) -> bool:
 # -- threats
 
 
-def _judge(vehicle: Vehicle, other: Aircraft) -> None:
+def _judge(vehicle: AutopilotVehicle, other: Aircraft) -> None:
     """Set the level of a threat, and the closest approach."""
     p = vehicle.parameters
     age = (vehicle.kernel.now() - other.at) // S
@@ -185,7 +185,7 @@ def _judge(vehicle: Vehicle, other: Aircraft) -> None:
     other.time = to_go / speed if to_go and speed else 0.0
 
 
-def _nearest_level(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
+def _nearest_level(vehicle: AutopilotVehicle, other: Aircraft, horizon: float) -> float:
     """Return the least horizontal distance [m] within *horizon* [s] at the present velocities."""
     here, own = vehicle.estimate.position, vehicle.estimate.velocity
     gap = (here[0] - other.place[0], here[1] - other.place[1])
@@ -195,7 +195,7 @@ def _nearest_level(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
     return hypot(gap[0] - share * path[0], gap[1] - share * path[1])
 
 
-def _nearest_height(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
+def _nearest_height(vehicle: AutopilotVehicle, other: Aircraft, horizon: float) -> float:
     """Return the least vertical distance [m] within *horizon* [s], as AP_Avoidance computes it."""
     above_cm = 100.0 * (vehicle.estimate.position[2] - other.place[2])
     sinking = other.velocity[2] - vehicle.estimate.velocity[2]
@@ -207,7 +207,7 @@ def _nearest_height(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
 # -- response
 
 
-def _respond(vehicle: Vehicle, threat: Aircraft | None) -> None:
+def _respond(vehicle: AutopilotVehicle, threat: Aircraft | None) -> None:
     """Follow the level upwards at once and downwards slowly, and act on a high one."""
     p, traffic, now = vehicle.parameters, traffic_of(vehicle), vehicle.kernel.now()
     level = threat.level if threat is not None else NO_THREAT
@@ -224,7 +224,7 @@ def _respond(vehicle: Vehicle, threat: Aircraft | None) -> None:
         traffic.action = _act(vehicle, threat, action)
 
 
-def _act(vehicle: Vehicle, threat: Aircraft, action: int) -> int:
+def _act(vehicle: AutopilotVehicle, threat: Aircraft, action: int) -> int:
     """Avoid another aircraft, and return the action that was possible."""
     traffic = traffic_of(vehicle)
     begins = not traffic.active
@@ -250,7 +250,7 @@ def _act(vehicle: Vehicle, threat: Aircraft, action: int) -> int:
     return action
 
 
-def _may_disarm(vehicle: Vehicle) -> bool:
+def _may_disarm(vehicle: AutopilotVehicle) -> bool:
     """Return whether a failsafe may stop the motors: on the ground, or in manual flight without throttle."""
     if vehicle.kernel.now() - vehicle.arming.armed_at < vehicle.rules.arming.motors_rest:
         return True
@@ -260,14 +260,14 @@ def _may_disarm(vehicle: Vehicle) -> bool:
     return vehicle.landed and not (isinstance(flown, FlyMission) and flown.started)
 
 
-def _enter(vehicle: Vehicle, mode: int) -> bool:
+def _enter(vehicle: AutopilotVehicle, mode: int) -> bool:
     entered = change_mode(vehicle, mode)
     if entered:
         traffic_of(vehicle).mode_entered = mode
     return entered
 
 
-def _escape(vehicle: Vehicle, threat: Aircraft, action: int) -> Vector | None:
+def _escape(vehicle: AutopilotVehicle, threat: Aircraft, action: int) -> Vector | None:
     """Return the velocity away from an aircraft, north, east, down [m/s]; ``None``: no direction is away."""
     tuning = vehicle.tuning
     stays = vehicle.height < tuning.return_height
@@ -299,7 +299,7 @@ def _escape(vehicle: Vehicle, threat: Aircraft, action: int) -> Vector | None:
     return north / size * tuning.speed, east / size * tuning.speed, sink
 
 
-def _recover(vehicle: Vehicle, recovery: int) -> None:
+def _recover(vehicle: AutopilotVehicle, recovery: int) -> None:
     """End avoidance; unless the mode was changed meanwhile, enter the one that AVD_F_RCVRY names."""
     traffic = traffic_of(vehicle)
     if not traffic.active:
@@ -315,7 +315,7 @@ def _recover(vehicle: Vehicle, recovery: int) -> None:
         any(change_mode(vehicle, mode) for mode in (wanted, RTL, LAND))
 
 
-def _report(vehicle: Vehicle, key: tuple[int, int], threat: Aircraft) -> None:
+def _report(vehicle: AutopilotVehicle, key: tuple[int, int], threat: Aircraft) -> None:
     """Send COLLISION once a second, for some seconds after the threat, too."""
     traffic, now = traffic_of(vehicle), vehicle.kernel.now()
     if threat.level != NO_THREAT:
@@ -368,6 +368,6 @@ COPTER = Feature(
         ),
     ),
     messages={"ADSB_VEHICLE": on_adsb, "GLOBAL_POSITION_INT": on_position},
-    checks=(Check("ADSB threat detected", is_threatened),),
+    checks=(ArmingCheck("ADSB threat detected", is_threatened),),
     on_tick=update_traffic,
 )

@@ -16,7 +16,7 @@ from volery.simulation.autopilots.autopilot_parameters import INT8, INT32, REAL3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Version:
+class ArduPilotVersion:
     """One version of the firmware, for copter and rover."""
 
     number: int
@@ -154,7 +154,7 @@ RENAMED_IN_4_7: Mapping[str, Renamed] = {
 }
 """Of 4.7 and 4.8; those of the receivers are of 4.6."""
 
-V4_5 = Version(
+V4_5 = ArduPilotVersion(
     number=67_438_335,
     title="V4.5.6",
     commit="7ce11b41",
@@ -164,7 +164,7 @@ V4_5 = Version(
     receiver_found=("GPS 1: detected as u-blox at 230400 baud",),
 )
 
-V4_8 = Version(
+V4_8 = ArduPilotVersion(
     number=67_633_152,
     title="V4.8.0-dev",
     commit="64a9c787",
@@ -175,5 +175,5 @@ V4_8 = Version(
     receiver_found=("GPS 1: probing for u-blox at 230400 baud", "GPS 1: detected u-blox"),
 )
 
-VERSIONS: Mapping[str, Version] = {"4.5": V4_5, "4.8": V4_8}
+VERSIONS: Mapping[str, ArduPilotVersion] = {"4.5": V4_5, "4.8": V4_8}
 """The newest last."""

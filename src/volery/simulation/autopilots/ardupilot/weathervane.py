@@ -14,7 +14,7 @@ from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import TICK, Feature
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.state_groups import NEVER, CommandedLimits
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.simulation.world.arithmetic import wrap_angle
 from volery.trace.events import INFO
 
@@ -47,14 +47,14 @@ class VaneState:
     before: float | None = None
 
 
-def _vane_of(vehicle: Vehicle) -> VaneState:
+def _vane_of(vehicle: AutopilotVehicle) -> VaneState:
     vane: VaneState | None = vehicle.kept.get(VaneState)
     if vane is None or vane.commanded is not vehicle.commanded:
         vane = vehicle.kept[VaneState] = VaneState(vehicle.commanded)
     return vane
 
 
-def turn_into_wind(vehicle: Vehicle) -> None:
+def turn_into_wind(vehicle: AutopilotVehicle) -> None:
     """Move the commanded heading while the copter weathervanes, and give it back afterwards."""
     vane = _vane_of(vehicle)
     if not vehicle.parameters["WVANE_ENABLE"]:
@@ -80,13 +80,13 @@ def turn_into_wind(vehicle: Vehicle) -> None:
     vehicle.commanded.yaw = vane.heading
 
 
-def _give_back(vehicle: Vehicle, vane: VaneState) -> None:
+def _give_back(vehicle: AutopilotVehicle, vane: VaneState) -> None:
     if vane.turning and vehicle.commanded.yaw == vane.heading:
         vehicle.commanded.yaw = vane.before
     vehicle.kept[VaneState] = VaneState(vehicle.commanded)
 
 
-def _side(vehicle: Vehicle) -> int:
+def _side(vehicle: AutopilotVehicle) -> int:
     """Return the side that turns into the wind, or ``OFF``."""
     parameters = vehicle.parameters
     options = {"AUTO": parameters["AUTO_OPTIONS"], "GUIDED": parameters["GUID_OPTIONS"]}
@@ -103,7 +103,7 @@ def _side(vehicle: Vehicle) -> int:
     return side
 
 
-def _steady(vehicle: Vehicle) -> bool:
+def _steady(vehicle: AutopilotVehicle) -> bool:
     """Return whether the copter is high and slow enough."""
     parameters = vehicle.parameters
     lowest, fastest = parameters["WVANE_HGT_MIN"], parameters["WVANE_SPD_MAX"]
@@ -116,7 +116,7 @@ def _steady(vehicle: Vehicle) -> bool:
     )
 
 
-def _rate(vehicle: Vehicle, side: int) -> float:
+def _rate(vehicle: AutopilotVehicle, side: int) -> float:
     """Return the rate of the turn [degrees/s] at a gain of 1: the lean beyond WVANE_ANG_MIN."""
     roll, pitch = (degrees(angle) for angle in vehicle.estimate.target_attitude[:2])
     dead = vehicle.parameters["WVANE_ANG_MIN"]

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from volery.base.time import to_seconds
-from volery.simulation.autopilots.ardupilot.feature import TICK, Check, Feature, Item, Kept
+from volery.simulation.autopilots.ardupilot.feature import TICK, ArmingCheck, Feature, Kept, MissionCommand
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, deflect, write
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO
 
 DO_WINCH = 42_600
@@ -54,16 +54,16 @@ class WinchState:
 winch_of = Kept(WinchState)
 
 
-def _is_there(vehicle: Vehicle) -> bool:
+def _is_there(vehicle: AutopilotVehicle) -> bool:
     return vehicle.parameters["WINCH_TYPE"] == SERVO
 
 
-def no_servo(vehicle: Vehicle) -> bool:
+def no_servo(vehicle: AutopilotVehicle) -> bool:
     """Return whether a winch has no output: a copter is not armed with it."""
     return _is_there(vehicle) and not channels(vehicle, WINCH)
 
 
-def _order(vehicle: Vehicle, action: int, length: float, rate: float) -> bool:
+def _order(vehicle: AutopilotVehicle, action: int, length: float, rate: float) -> bool:
     """Carry out an order, and return whether there is a winch and such an action.
 
     Args:
@@ -89,23 +89,23 @@ def _order(vehicle: Vehicle, action: int, length: float, rate: float) -> bool:
     return True
 
 
-def on_winch(vehicle: Vehicle, command: Command) -> int:
+def on_winch(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_WINCH: param2 is the action, param3 a length [m], param4 a rate [m/s]."""
     done = _order(vehicle, round(command.param2), command.param3, command.param4)
     return ACCEPTED if done else FAILED
 
 
-def act_on_winch(vehicle: Vehicle, item: MissionItem) -> None:
+def act_on_winch(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute the mission item DO_WINCH."""
     _order(vehicle, round(item.param2), item.param3, item.param4)
 
 
-def switch_winch(vehicle: Vehicle, position: int) -> None:
+def switch_winch(vehicle: AutopilotVehicle, position: int) -> None:
     """Hold the line with the switch up, let it go in the middle and down."""
     _order(vehicle, BY_RATE if position > 0 else RELAXED, 0.0, 0.0)
 
 
-def update_winch(vehicle: Vehicle) -> None:
+def update_winch(vehicle: AutopilotVehicle) -> None:
     """Turn the winch, and pay out the line, at each tick."""
     if not _is_there(vehicle) or not channels(vehicle, WINCH):
         return
@@ -128,7 +128,7 @@ def update_winch(vehicle: Vehicle) -> None:
     winch.length += winch.rate * seconds
 
 
-def _read_pilot(vehicle: Vehicle, winch: WinchState, fastest: float) -> None:
+def _read_pilot(vehicle: AutopilotVehicle, winch: WinchState, fastest: float) -> None:
     """Take the rate from the channel with the option for it, once that has moved."""
     parameters, rc = vehicle.parameters, vehicle.rc
     used = (n for n in range(FIRST_SWITCH, len(rc.transmitter) + 1) if parameters[f"RC{n}_OPTION"] == CONTROL)
@@ -146,7 +146,7 @@ def _read_pilot(vehicle: Vehicle, winch: WinchState, fastest: float) -> None:
         winch.rate = travel.deflection(rc[channel]) * fastest
 
 
-def _leave_to_channel(_vehicle: Vehicle, _position: int) -> None:
+def _leave_to_channel(_vehicle: AutopilotVehicle, _position: int) -> None:
     """Do nothing: the pulse width of the channel counts, not its position as a switch."""
 
 
@@ -158,12 +158,12 @@ COPTER = Feature(
         "WINCH_TYPE": ("", "1: there is a winch with a servo"),
     },
     commands={DO_WINCH: on_winch},
-    items={DO_WINCH: Item("Winch", act_on_winch)},
+    items={DO_WINCH: MissionCommand("Winch", act_on_winch)},
     switches={WINCH_SWITCH: switch_winch, CONTROL: _leave_to_channel},
-    checks=(Check("winch unhealthy", no_servo),),
+    checks=(ArmingCheck("winch unhealthy", no_servo),),
     on_tick=update_winch,
 )
 ROVER = Feature(
-    items={DO_WINCH: Item("Winch")},  # stored and passed over
+    items={DO_WINCH: MissionCommand("Winch")},  # stored and passed over
     switches=COPTER.switches,
 )

@@ -33,9 +33,9 @@ from volery.ros.messages.dji_constants import (
     GimbalMode,
 )
 from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
-from volery.simulation.autopilots.dji.sdk_services import Answer, Services
+from volery.simulation.autopilots.dji.sdk_services import Answer, SdkServices
 from volery.simulation.autopilots.dji.waypoint_v2 import WaypointV2Services
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import Text
 
 INERTIAL, FAST, NORMAL, SLOW = 2_500_000, 10 * MS, 20 * MS, 200 * MS
@@ -58,7 +58,7 @@ Builder = Callable[[FlightController, Ns], Any]
 """Returns a message stamped with a ROS time, or None while there is none."""
 
 
-class Topic(NamedTuple):
+class SdkTopic(NamedTuple):
     """Name, type, period, builder and QoS of one topic."""
 
     name: str
@@ -202,32 +202,35 @@ def _battery(controller: FlightController, stamp: Ns) -> Any:
     return made
 
 
-TOPICS: tuple[Topic, ...] = (
-    Topic("attitude", "geometry_msgs/msg/QuaternionStamped", FAST, _attitude),
-    Topic("imu", "sensor_msgs/msg/Imu", INERTIAL, _imu),
-    Topic("angular_velocity_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _rates),
-    Topic("acceleration_ground_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _acceleration),
-    Topic("flight_status", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.status)),
-    Topic("display_mode", "std_msgs/msg/UInt8", NORMAL, _display_mode),
-    Topic("gps_health", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.gps_health)),
-    Topic("gps_position", "sensor_msgs/msg/NavSatFix", NORMAL, _gps_position),
-    Topic("local_position", "geometry_msgs/msg/PointStamped", NORMAL, _local_position),
-    Topic("height_above_takeoff", "std_msgs/msg/Float32", NORMAL, _height),
-    Topic("velocity", "geometry_msgs/msg/Vector3Stamped", NORMAL, _velocity),
-    Topic("gimbal_angle", "geometry_msgs/msg/Vector3Stamped", NORMAL, _gimbal_angle),
-    Topic("rc", "sensor_msgs/msg/Joy", NORMAL, _rc),
-    Topic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, _rc_connection),
-    Topic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
+TOPICS: tuple[SdkTopic, ...] = (
+    SdkTopic("attitude", "geometry_msgs/msg/QuaternionStamped", FAST, _attitude),
+    SdkTopic("imu", "sensor_msgs/msg/Imu", INERTIAL, _imu),
+    SdkTopic("angular_velocity_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _rates),
+    SdkTopic("acceleration_ground_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _acceleration),
+    SdkTopic("flight_status", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.status)),
+    SdkTopic("display_mode", "std_msgs/msg/UInt8", NORMAL, _display_mode),
+    SdkTopic("gps_health", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.gps_health)),
+    SdkTopic("gps_position", "sensor_msgs/msg/NavSatFix", NORMAL, _gps_position),
+    SdkTopic("local_position", "geometry_msgs/msg/PointStamped", NORMAL, _local_position),
+    SdkTopic("height_above_takeoff", "std_msgs/msg/Float32", NORMAL, _height),
+    SdkTopic("velocity", "geometry_msgs/msg/Vector3Stamped", NORMAL, _velocity),
+    SdkTopic("gimbal_angle", "geometry_msgs/msg/Vector3Stamped", NORMAL, _gimbal_angle),
+    SdkTopic("rc", "sensor_msgs/msg/Joy", NORMAL, _rc),
+    SdkTopic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, _rc_connection),
+    SdkTopic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
 )
 """All periodic topics except ``flight_anomaly``, whose type depends on the package."""
 
-REFERENCE = Topic("local_frame_ref", "sensor_msgs/msg/NavSatFix", 0, _local_frame_ref, LATCHED)
+REFERENCE = SdkTopic("local_frame_ref", "sensor_msgs/msg/NavSatFix", 0, _local_frame_ref, LATCHED)
 
 
-def topics(package: str) -> tuple[Topic, ...]:
+def topics(package: str) -> tuple[SdkTopic, ...]:
     """Return all periodic topics with the types of a package."""
     kind = f"{package}/msg/FlightAnomaly"
-    return (*TOPICS, Topic("flight_anomaly", kind, NORMAL, lambda one, _: message_class(kind)(one.anomalies)))
+    return (
+        *TOPICS,
+        SdkTopic("flight_anomaly", kind, NORMAL, lambda one, _: message_class(kind)(one.anomalies)),
+    )
 
 
 SUBSCRIBER_CHECK_PERIOD: Ns = 200 * MS
@@ -243,11 +246,11 @@ def _raise(_index: int, error: Exception) -> None:
 class _TopicGroup:
     """Topics of one period."""
 
-    def __init__(self, endpoint: DjiEndpoint, period: Ns, listed: list[tuple[Topic, Publisher]]) -> None:
+    def __init__(self, endpoint: DjiEndpoint, period: Ns, listed: list[tuple[SdkTopic, Publisher]]) -> None:
         self._endpoint = endpoint
         self._check_every = max(1, SUBSCRIBER_CHECK_PERIOD // period)
         self._listed = listed
-        self._subscribed: list[tuple[Topic, Publisher]] = []
+        self._subscribed: list[tuple[SdkTopic, Publisher]] = []
         self._round = 0
         self._rests_until: Ns = 0  # no topic is awaited before
 
@@ -278,7 +281,7 @@ class _TopicGroup:
 class DjiEndpoint:
     """Protocol endpoint of one aircraft on a ROS graph."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
         self._on = False
@@ -340,7 +343,7 @@ class DjiEndpoint:
         node = self._node = graph.node(package, above or "/", context=place)
         self._advertise(node, package)
         self._listen(node, package)
-        services = Services(self.controller, self._publish_reference)
+        services = SdkServices(self.controller, self._publish_reference)
         group = node.group(self._start_next if package == NEW_NAMES else self._start)
         second_kind = WaypointV2Services(self.controller).table() if package == NEW_NAMES else ()
         for served in (*services.table(package), *second_kind):
@@ -349,7 +352,7 @@ class DjiEndpoint:
             self.start()
 
     def _advertise(self, node: Node, package: str) -> None:
-        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {INERTIAL: [], FAST: [], NORMAL: [], SLOW: []}
+        listed: dict[Ns, list[tuple[SdkTopic, Publisher]]] = {INERTIAL: [], FAST: [], NORMAL: [], SLOW: []}
         for topic in topics(package):
             publisher = node.advertise(f"{package}/{topic.name}", topic.type, topic.qos)
             slower = topic.period == INERTIAL and self.controller.aircraft == M100

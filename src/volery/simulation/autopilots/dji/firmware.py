@@ -14,9 +14,15 @@ from volery.ros.messages.dji_constants import (
     HEADERS,
     NO_CODE,
     DisplayMode,
-    Source,
+    DocumentedBehaviour,
 )
-from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Failsafe, Firmware, PeriodicWork
+from volery.simulation.autopilots.autopilot import (
+    BootEvent,
+    BootSequence,
+    Firmware,
+    PeriodicWork,
+    WatchedCondition,
+)
 from volery.simulation.autopilots.dji.endpoint import DjiEndpoint
 from volery.simulation.autopilots.dji.flight_controller import (
     CONFIRM_BELOW_M,
@@ -58,15 +64,15 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     MissionRules,
     copter_leg,
 )
-from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff
+from volery.simulation.autopilots.manoeuvres.to_point import ClimbStraight, DescendAndLand, ReturnAndLand
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
-    Manoeuvre,
+    AutopilotVehicle,
+    FlightManoeuvre,
     Mode,
     ParameterTable,
     RcDefaults,
     StartupTimes,
-    Vehicle,
     VehicleRules,
 )
 
@@ -77,11 +83,11 @@ NO_BITS = 0
 """There is no heartbeat."""
 
 
-def _take_off(vehicle: Vehicle) -> Manoeuvre:
-    return TakeOff(vehicle, vehicle.parameters["TAKEOFF_HEIGHT"])
+def _take_off(vehicle: AutopilotVehicle) -> FlightManoeuvre:
+    return ClimbStraight(vehicle, vehicle.parameters["TAKEOFF_HEIGHT"])
 
 
-class Landing(Land):
+class SdkLanding(DescendAndLand):
     """Descent to the ground; with LAND_WAITS it waits low above it until a program confirms."""
 
     def sink(self) -> float:
@@ -98,7 +104,7 @@ MISSION_RULES = MissionRules(
 )
 
 
-def _mission(vehicle: Vehicle) -> Manoeuvre:
+def _mission(vehicle: AutopilotVehicle) -> FlightManoeuvre:
     return FlyMission(vehicle, copter_leg, MISSION_RULES)
 
 
@@ -108,28 +114,28 @@ MODES = {
         Mode(DisplayMode.ATTITUDE, "ATTITUDE", NO_BITS, AltitudeHold, pilot=True),
         Mode(DisplayMode.P_GPS, "P_GPS", NO_BITS, Loiter, pilot=True),
         Mode(DisplayMode.AUTO_TAKEOFF, "AUTO_TAKEOFF", NO_BITS, _take_off),
-        Mode(DisplayMode.AUTO_LANDING, "AUTO_LANDING", NO_BITS, Landing),
+        Mode(DisplayMode.AUTO_LANDING, "AUTO_LANDING", NO_BITS, SdkLanding),
         Mode(DisplayMode.NAVI_MISSION, "NAVI_MISSION", NO_BITS, _mission, needs_position=True),
-        Mode(DisplayMode.NAVI_GO_HOME, "NAVI_GO_HOME", NO_BITS, Return, needs_position=True),
+        Mode(DisplayMode.NAVI_GO_HOME, "NAVI_GO_HOME", NO_BITS, ReturnAndLand, needs_position=True),
         Mode(DisplayMode.NAVI_SDK_CTRL, "NAVI_SDK_CTRL", NO_BITS, SdkControl),
-        Mode(DisplayMode.FORCE_AUTO_LANDING, "FORCE_AUTO_LANDING", NO_BITS, Land),
+        Mode(DisplayMode.FORCE_AUTO_LANDING, "FORCE_AUTO_LANDING", NO_BITS, DescendAndLand),
     )
 }
 
 
-def finish_boot(vehicle: Vehicle) -> None:
+def finish_boot(vehicle: AutopilotVehicle) -> None:
     """Put the aircraft on the ground in P_GPS."""
     vehicle.ground.landed = True
     controller_of(vehicle).reset()
     vehicle.enter_mode(MODES[DisplayMode.P_GPS])
 
 
-def _below(percent: str) -> Failsafe:
+def _below(percent: str) -> WatchedCondition:
     begins = {
         "LOW_BATTERY": FlightController.low_battery,
         "CRITICAL_BATTERY": FlightController.critical_battery,
     }[percent]
-    return Failsafe(
+    return WatchedCondition(
         percent.lower().replace("_", " "),
         lambda vehicle: vehicle.estimate.battery_left * 100.0 < vehicle.parameters[percent],
         lambda vehicle: begins(controller_of(vehicle)),
@@ -186,67 +192,77 @@ ASSUMED: Mapping[str, str] = {
 }
 """Subject and assumption, as in docs/dji.md."""
 
-DOCUMENTED: Mapping[str, Source] = {
-    "authority": Source("A3 and N3 at P, M100 at F, M210 at P or F, M600 at each position", GUIDES),
-    "mode switch": Source(
+DOCUMENTED: Mapping[str, DocumentedBehaviour] = {
+    "authority": DocumentedBehaviour(
+        "A3 and N3 at P, M100 at F, M210 at P or F, M600 at each position", GUIDES
+    ),
+    "mode switch": DocumentedBehaviour(
         "any move takes the authority; `rc` shows it on its fifth axis: +1, 0, -1 for P, A, F of an A3 or "
         "N3, which have 12 axes; -8000, 0, 8000 of an M100; up to 10000 of others",
         f"{GUIDES}; node 3.8",
     ),
-    "`gps_position`": Source(
+    "`gps_position`": DocumentedBehaviour(
         "altitude by pressure, tens of metres off; without satellites the place stays, messages go on, the "
         "status is always a fix",
         f"{HEADERS}; users (Onboard-SDK #216, #258, #488; ROS #132)",
     ),
-    "`gps_health`": Source("0 until the home point is set, then the signal level", f"{HEADERS}; node 3.8"),
-    "`height_above_takeoff`": Source(
+    "`gps_health`": DocumentedBehaviour(
+        "0 until the home point is set, then the signal level", f"{HEADERS}; node 3.8"
+    ),
+    "`height_above_takeoff`": DocumentedBehaviour(
         "0 on an A3, N3 and M600; the distance to the ground on an M210, which latches; a height on an M100",
         f"{HEADERS}; users (Onboard-SDK #160, #218; ROS #161, #461)",
     ),
-    "task 4": Source(
+    "task 4": DocumentedBehaviour(
         "climbs to about 1.2 m, only while the motors stand; an M100 whose motors turn accepts and stays",
         f"{GUIDES}; support (ROS #15)",
     ),
-    "motors": Source("a program stops them on the ground only; 4.1 has a kill switch", f"{GUIDES}; node 4.1"),
-    "set-points and landing": Source("do not end it", "support (ROS #44)"),
-    "set-points and position": Source(
+    "motors": DocumentedBehaviour(
+        "a program stops them on the ground only; 4.1 has a kill switch", f"{GUIDES}; node 4.1"
+    ),
+    "set-points and landing": DocumentedBehaviour("do not end it", "support (ROS #44)"),
+    "set-points and position": DocumentedBehaviour(
         "need GPS, without which only height and heading act; half the offset is flown each second, "
         "at 3 m/s at most",
         f"{HEADERS}; support (Onboard-SDK #459, of an M600)",
     ),
-    "going home": Source("near home it lands on the spot: within 20 m", "support (ROS #469, of an M210)"),
-    "landing of an M600": Source(
+    "going home": DocumentedBehaviour(
+        "near home it lands on the spot: within 20 m", "support (ROS #469, of an M210)"
+    ),
+    "landing of an M600": DocumentedBehaviour(
         f"{M600_LAND_FAST:g} m/s, and {M600_LAND_SLOW:g} m/s from {M600_SLOW_BELOW:g} m above the take-off "
         "point on",
         "support (Onboard-SDK #163)",
     ),
-    "landing that waits": Source(
+    "landing that waits": DocumentedBehaviour(
         f"at about {CONFIRM_BELOW_M:g} m where the ground looks unsuitable; 3.8 has no task to confirm",
         "manuals; node 4.1",
     ),
-    "loss of the transmitter": Source(
+    "loss of the transmitter": DocumentedBehaviour(
         f"after {to_seconds(RC_LOST_AFTER):g} s it goes home, or hovers if Assistant 2 is set so", GUIDES
     ),
-    "no transmitter since power-on": Source(
+    "no transmitter since power-on": DocumentedBehaviour(
         f"stays within {NO_RC_RADIUS_M:g} m and {NO_RC_HEIGHT_M:g} m: missions beyond are refused; "
         "set-points stop there",
         "support (Onboard-SDK #359; ROS #169)",
     ),
-    "no-fly zone": Source(
+    "no-fly zone": DocumentedBehaviour(
         "no start inside; it hovers at the border; a mission across is refused", "support (ROS #471); headers"
     ),
-    "low battery": Source("goes home after 10 s; critical: lands at once; both override the program", GUIDES),
-    "missions": Source(
+    "low battery": DocumentedBehaviour(
+        "goes home after 10 s; critical: lands at once; both override the program", GUIDES
+    ),
+    "missions": DocumentedBehaviour(
         f"{MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints, {LONGEST_PATH_M / 1000:g} km; action {STAY_ACTION} "
         "stays for milliseconds; the upload takes 1 s and 1 s for each waypoint. An M300 takes those of a "
         "second kind only (`waypointV2_…`), in radians, without a stay",
         f"{GUIDES}; nodes 3.8 and 4.1",
     ),
-    "vehicle node of 4.1": Source(
+    "vehicle node of 4.1": DocumentedBehaviour(
         "one request at a time: take-off and landing answer when finished; a refusal is a failed call",
         "node 4.1",
     ),
-    "topics": Source(
+    "topics": DocumentedBehaviour(
         "`imu` at 400 Hz, of an M100 at 100 Hz; an M100 has no `display_mode`, `angular_velocity_fused` and "
         "`acceleration_ground_fused`, an M600 no `rc_connection_status`",
         "node 3.8; users (ROS #325)",

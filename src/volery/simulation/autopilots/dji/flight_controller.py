@@ -42,10 +42,10 @@ from volery.simulation.autopilots.dji.sdk_commands import (
     mission_refusal,
     sdk_command,
 )
-from volery.simulation.autopilots.manoeuvres.to_point import Land
+from volery.simulation.autopilots.manoeuvres.to_point import DescendAndLand
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO, WARNING
 
 SWITCH, F_ABOVE, P_BELOW = 5, 1700, 1300
@@ -89,12 +89,12 @@ LANDING_MODES = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LAND
 
 
 class FlightController:
-    """State that only this firmware keeps about a vehicle (``Vehicle.firmware_state``).
+    """State that only this firmware keeps about a vehicle (``AutopilotVehicle.firmware_state``).
 
     ``has_authority`` is true while an onboard program has the SDK authority.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self.vehicle = vehicle
         self._activates_at_power_on = False
         self._aircraft = vehicle.parameters.changes, aircraft_type(vehicle.parameters)
@@ -559,7 +559,7 @@ class FlightController:
         elif number == DisplayMode.NAVI_GO_HOME:
             if manoeuvre.landing:
                 self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._requested_by_sdk)
-                if isinstance(vehicle.manoeuvre, Land) and vehicle.home is not None:
+                if isinstance(vehicle.manoeuvre, DescendAndLand) and vehicle.home is not None:
                     vehicle.manoeuvre.point = vehicle.home.ned
         elif number == DisplayMode.P_GPS and not vehicle.has_position:
             vehicle.send_text(WARNING, "position lost")
@@ -616,7 +616,7 @@ def _distance_to_leg(point: tuple[float, float], start: tuple[float, ...], end: 
     return dist(point, (start[0] + share * north, start[1] + share * east))
 
 
-def controller_of(vehicle: Vehicle) -> FlightController:
+def controller_of(vehicle: AutopilotVehicle) -> FlightController:
     """Return the flight controller of a vehicle."""
     controller: FlightController = vehicle.firmware_state
     return controller

@@ -12,9 +12,9 @@ from volery.ros.messages.dji_constants import HARDWARE, M600
 from volery.simulation.autopilots.autopilot_parameters import (
     INT8,
     REAL32,
-    Parameter,
-    Parameters,
-    Tuning,
+    ManoeuvreTuning,
+    StoredParameter,
+    VehicleParameters,
     quantised,
 )
 
@@ -63,20 +63,20 @@ M600_SLOW_BELOW, M600_LAND_FAST, M600_LAND_SLOW = 20.0, 3.0, 0.5
 """The same of an M600, and its speeds in a landing [m, m/s]: support of DJI, in a thread."""
 
 
-def parameters() -> tuple[Parameter, ...]:
+def parameters() -> tuple[StoredParameter, ...]:
     """Return the default parameters."""
-    return tuple(Parameter(name, kind, quantised(kind, value)) for name, kind, value, _ in _FIGURES)
+    return tuple(StoredParameter(name, kind, quantised(kind, value)) for name, kind, value, _ in _FIGURES)
 
 
-def aircraft_type(parameters: Parameters) -> str:
+def aircraft_type(parameters: VehicleParameters) -> str:
     """Return the type of the aircraft, such as A3 or M100."""
     return AIRCRAFT[min(len(AIRCRAFT) - 1, max(0, round(parameters["AIRCRAFT"])))]
 
 
-def tuning(parameters: Parameters) -> Tuning:
+def tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning that follows from the parameters."""
     p, m600 = parameters, aircraft_type(parameters) == M600
-    return Tuning(
+    return ManoeuvreTuning(
         speed=PILOT_SPEED,
         speed_up=max(0.1, p["CLIMB_SPEED"]),
         speed_down=max(0.1, p["SINK_SPEED"]),

@@ -15,10 +15,10 @@ from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SD
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
-from volery.simulation.autopilots.vehicle_state import Manoeuvre
+from volery.simulation.autopilots.vehicle_state import FlightManoeuvre
 
 if TYPE_CHECKING:
-    from volery.simulation.autopilots.vehicle_state import Vehicle
+    from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 LIFT_OFF_M, LIFT_OFF_M_S, LIFT_OFF_PERCENT = 0.5, 0.1, 20.0
 """Set-points above these values take a standing aircraft with running motors off the ground: assumed."""
@@ -70,22 +70,22 @@ def sdk_command(numbers: tuple[float, ...], flag: int, anchor: Vector) -> SdkCom
     if len(numbers) < 4 or not all(isfinite(number) for number in numbers[:4]):
         return None
     x, y, z, yaw = numbers[:4]
-    made = SdkCommand(flag, x, y, z, yaw, anchor)
-    angles = made.horizontal == 0
-    if made.horizontal == Flag.HORIZONTAL_RATE or made.vertical == VERTICAL:
+    command = SdkCommand(flag, x, y, z, yaw, anchor)
+    angles = command.horizontal == 0
+    if command.horizontal == Flag.HORIZONTAL_RATE or command.vertical == VERTICAL:
         return None
-    if made.vertical == Flag.VERTICAL_THRUST and not angles:
+    if command.vertical == Flag.VERTICAL_THRUST and not angles:
         return None
-    return made
+    return command
 
 
-class SdkControl(Manoeuvre):
+class SdkControl(FlightManoeuvre):
     """NAVI_SDK_CTRL: follow the last set-point.
 
     Without satellites, set-points over ground have no horizontal effect: it flies level, and drifts.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self.command: SdkCommand | None = None
 

@@ -112,7 +112,7 @@ UPLOAD_PERIOD: Ns = S
 """Time that the node takes for a mission, and for each of its waypoints."""
 
 
-class Services:
+class SdkServices:
     """Services of one aircraft. ``on_reference`` is called once there is a local reference."""
 
     def __init__(self, controller: FlightController, on_reference: Callable[[], None]) -> None:

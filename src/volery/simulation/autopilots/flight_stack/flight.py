@@ -41,9 +41,9 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     YAW_ANGLE,
     YAW_ANGLE_AND_RATE,
     YAW_RATE,
-    Airframe,
     Control,
     Estimate,
+    EstimateConstants,
     GpsFix,
 )
 from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
@@ -77,7 +77,7 @@ from volery.simulation.world.state_layout import (
     U_WIND,
     W_ROTATION,
 )
-from volery.simulation.world.world import STEP, Attendant, Collision, MotionSource, Truth, World
+from volery.simulation.world.world import STEP, Attendant, BodyImpact, MotionSource, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
@@ -199,7 +199,7 @@ class Flight:
         """Capacity of the battery [A s]."""
         self.rotors = len(self.spec.rotors) if isinstance(self.spec, Multirotor) else 0
         """Number of rotors; 0 for a rover."""
-        self._airframe = Airframe(
+        self._airframe = EstimateConstants(
             self.frame, self.flying, self.rotors, self.capacity_as, sensor_suite(self.spec.sensors)
         )
         self._row = cast("memoryview[float]", memoryview(cast("Any", world.arrays.rows[body])))
@@ -258,7 +258,7 @@ class Flight:
         Example: ``flight.drive_motors([flight.spec.hover_throttle] * flight.rotors)``
         """
         count, least = (self.rotors, 0.0) if self.flying else (2, -1.0)
-        if len(commands) != count or not all(least <= one <= 1.0 for one in commands):
+        if len(commands) != count or not all(least <= command <= 1.0 for command in commands):
             raise UsageError(f"motor commands {[*commands]}: give {count}, each from {least:g} to 1")
         if not self._driven or self._driven[0] != EXTERNAL:
             self._driven = (float(EXTERNAL),)
@@ -304,7 +304,7 @@ class Flight:
         own = self.spec.mass + (self.spec.payload if isinstance(self.spec, Multirotor) else 0.0)
         self._world.set_input(self._body, P_MASS, own + load)
 
-    def last_collision(self) -> Collision | None:
+    def last_collision(self) -> BodyImpact | None:
         """Return how the body last hit something that stands in the world; ``None``: it has not."""
         return self._world.last_collision(self._body)
 

@@ -37,7 +37,7 @@ from volery.simulation.world.state_layout import (
     S_VOLTS,
     WORLD,
     WORLD_LAYOUT,
-    Layout,
+    ColumnLayout,
 )
 
 
@@ -73,7 +73,7 @@ REFUSE, FUSE, RESET = range(3)
 HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""
 
-FLIGHT_LAYOUT = Layout(after=WORLD_LAYOUT)
+FLIGHT_LAYOUT = ColumnLayout(after=WORLD_LAYOUT)
 _add = FLIGHT_LAYOUT.add
 RPY = "roll, pitch, yaw"
 assert FLIGHT_LAYOUT.start == WORLD
@@ -231,7 +231,7 @@ class GpsFix:
 
 
 @dataclass
-class Airframe:
+class EstimateConstants:
     """Constants of a vehicle that are needed to read its estimate, and the estimator's last origin."""
 
     frame: LocalFrame
@@ -267,7 +267,7 @@ def _satellites(fix_type: int) -> int:
     return 10 if fix_type else 0
 
 
-def _fix_of(about: Airframe, row: Sequence[float]) -> GpsFix:
+def _fix_of(about: EstimateConstants, row: Sequence[float]) -> GpsFix:
     """Return the receiver's last sample, of the columns of *row*, as a fix."""
     latitude, longitude, amsl = about.frame.from_ned((row[M_GPS], row[M_GPS + 1], row[M_GPS + 2]))
     kind = int(row[M_GPS_FIX])
@@ -299,7 +299,7 @@ class Estimate:
 
     __slots__ = ("_about", "_fix", "_geodetic", "_octets", "_position", "_row", "time")
 
-    def __init__(self, about: Airframe, time: Ns, row: bytes) -> None:
+    def __init__(self, about: EstimateConstants, time: Ns, row: bytes) -> None:
         self._about = about
         self.time = time
         self._octets = row

@@ -8,8 +8,13 @@ from typing import NamedTuple
 from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import Brake, TakeOff, ToPoint, direction_of_flight
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.manoeuvres.to_point import (
+    Brake,
+    ClimbStraight,
+    ToPoint,
+    direction_of_flight,
+)
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 from volery.simulation.world.arithmetic import wrap_angle
 
 
@@ -24,7 +29,7 @@ OWN_HEADING = Turn()
 """Turn the nose to the direction of flight where the tuning says so, else keep the heading."""
 
 
-class FollowVelocity(Manoeuvre):
+class FollowVelocity(FlightManoeuvre):
     """Follow a velocity that may grow; stop when no command arrives for the time-out.
 
     Args:
@@ -35,7 +40,7 @@ class FollowVelocity(Manoeuvre):
     """
 
     def __init__(
-        self, vehicle: Vehicle, velocity: Vector, turn: Turn, acceleration: Vector = (0.0, 0.0, 0.0)
+        self, vehicle: AutopilotVehicle, velocity: Vector, turn: Turn, acceleration: Vector = (0.0, 0.0, 0.0)
     ) -> None:
         super().__init__(vehicle)
         self.velocity = velocity
@@ -95,7 +100,7 @@ class TurnAtPoint(ToPoint):
         rate: Yaw rate [rad/s].
     """
 
-    def __init__(self, vehicle: Vehicle, point: Vector, rate: float) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector, rate: float) -> None:
         super().__init__(vehicle, point)
         self._rate = rate
         self._given: Ns = vehicle.kernel.now()
@@ -110,7 +115,7 @@ class TurnAtPoint(ToPoint):
         return replace(setpoint, yaw=None, yaw_rate=self._rate)
 
 
-class FollowAttitude(Manoeuvre):
+class FollowAttitude(FlightManoeuvre):
     """Follow an attitude and a climb rate.
 
     When no command arrives for the time-out, it levels out and holds the height.
@@ -125,7 +130,7 @@ class FollowAttitude(Manoeuvre):
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: AutopilotVehicle,
         attitude: Quaternion | None,
         yaw_rate: float | None,
         thrust: float,
@@ -169,13 +174,13 @@ class FollowAttitude(Manoeuvre):
         )
 
 
-class Guided(Manoeuvre):
+class Guided(FlightManoeuvre):
     """Execute the last command. On the ground only a take-off starts the motors."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._doing: Manoeuvre = ToPoint(vehicle)
-        self._kind: type[Manoeuvre] | None = None
+        self._doing: FlightManoeuvre = ToPoint(vehicle)
+        self._kind: type[FlightManoeuvre] | None = None
         """Kind of command; another kind ends the speeds that DO_CHANGE_SPEED has set."""
         self._waiting: Brake | None = None
         """What is flown during a pause."""
@@ -195,7 +200,7 @@ class Guided(Manoeuvre):
         self._begin(ToPoint(self.vehicle))
         self._kind = None
 
-    def _begin(self, doing: Manoeuvre) -> None:
+    def _begin(self, doing: FlightManoeuvre) -> None:
         kind = ToPoint if isinstance(doing, TurnAtPoint) else type(doing)
         if kind is not self._kind:
             self._kind = kind
@@ -223,13 +228,13 @@ class Guided(Manoeuvre):
         if self._waiting is not None:
             self._waiting.step()
             return
-        if doing.taking_off and isinstance(doing, TakeOff) and doing.arrived():
+        if doing.taking_off and isinstance(doing, ClimbStraight) and doing.arrived():
             self.taking_off = doing.taking_off = False
         doing.step()
 
     def take_off(self, height: float) -> None:
         """Climb straight up to a height above home [m]."""
-        self._begin(TakeOff(self.vehicle, height))
+        self._begin(ClimbStraight(self.vehicle, height))
 
     def go_to(self, point: Vector, turn: Turn = OWN_HEADING) -> None:
         """Go to a point north, east, down about the estimator's origin [m]; the command does not expire."""

@@ -13,17 +13,23 @@ from volery.base.elementary import atan2, cos, sin, tan
 from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Circle
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyCircle
 from volery.simulation.autopilots.manoeuvres.rover_driving import STANDING, DriveTo
-from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, Land, ToPoint, root_speed, stopping_point
+from volery.simulation.autopilots.manoeuvres.to_point import (
+    CLOSE,
+    DescendAndLand,
+    ToPoint,
+    root_speed,
+    stopping_point,
+)
 from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, AutopilotVehicle, FlightManoeuvre
 
 GRAVITY = 9.80665
 
 
-class ManualFlight(Manoeuvre):
+class ManualFlight(FlightManoeuvre):
     """Common part of the manoeuvres by RC channels."""
 
     @property
@@ -87,7 +93,7 @@ class Stabilize(ManualFlight):
 class ClimbByThrottle(ManualFlight):
     """Common part of the modes whose throttle commands a climb rate, with the take-off to a height."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._height: float | None = None
         """Height of the take-off [m]."""
@@ -153,7 +159,7 @@ class Loiter(ClimbByThrottle):
     With the sticks centred the vehicle brakes and holds its position.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._velocity: tuple[float, float] = (0.0, 0.0)
         self._last: Ns = 0
@@ -251,7 +257,7 @@ ROVER_TURN_RATE = radians(120.0)
 class Acro(Stabilize):
     """Sticks command roll and pitch rates; the trainer limits the lean and levels out."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._roll = self._pitch = 0.0
         self._last: Ns = vehicle.kernel.now()
@@ -306,9 +312,9 @@ class Drift(Stabilize):
 class CircleMode(ManualFlight):
     """Fly circles about a point one radius ahead; the throttle commands the climb."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._circle: Circle | None = None
+        self._circle: FlyCircle | None = None
         self._centre: Vector = (0.0, 0.0, 0.0)
         self._last: Ns = vehicle.kernel.now()
 
@@ -325,7 +331,7 @@ class CircleMode(ManualFlight):
         radius = tuning.circle_radius
         self._centre = (north + radius * cos(heading), east + radius * sin(heading), down)
         self._last = vehicle.kernel.now()
-        self._circle = Circle(vehicle, self._centre, radius, tuning.circle_rate)
+        self._circle = FlyCircle(vehicle, self._centre, radius, tuning.circle_rate)
         self._circle.enter()
 
     def step(self) -> None:
@@ -338,14 +344,14 @@ class CircleMode(ManualFlight):
         self._circle.step()
 
 
-class ReturnAlongTrack(Manoeuvre):
+class ReturnAlongTrack(FlightManoeuvre):
     """Fly or drive back along the points that were passed since arming, then land or stop."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._left: list[Vector] = []
         self._leg: ToPoint | DriveTo | None = None
-        self._landing: Land | None = None
+        self._landing: DescendAndLand | None = None
         self._home_at: Ns | None = None
 
     def enter(self) -> None:
@@ -384,11 +390,15 @@ class ReturnAlongTrack(Manoeuvre):
         elif not self._left and self.vehicle.flies and self._leg.arrived():
             self._home_at = now if self._home_at is None else self._home_at
             if now - self._home_at >= self.vehicle.tuning.return_wait:
-                self._landing, self.landing, self.target = Land(self.vehicle, self._leg.point), True, None
+                self._landing, self.landing, self.target = (
+                    DescendAndLand(self.vehicle, self._leg.point),
+                    True,
+                    None,
+                )
         self._leg.step()
 
 
-class Steering(Manoeuvre):
+class Steering(FlightManoeuvre):
     """Sticks command a rover's speed and turn rate."""
 
     def step(self) -> None:
@@ -407,10 +417,10 @@ class Steering(Manoeuvre):
         )
 
 
-class Simple(Manoeuvre):
+class Simple(FlightManoeuvre):
     """Sticks command a rover's course about the heading at which the mode was entered."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._ahead = 0.0
 
@@ -435,10 +445,10 @@ class Simple(Manoeuvre):
         )
 
 
-class HoldPlace(Manoeuvre):
+class RoverHold(FlightManoeuvre):
     """Keep a rover near the point where it stopped."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._driving = DriveTo(vehicle, vehicle.estimate.position)
 

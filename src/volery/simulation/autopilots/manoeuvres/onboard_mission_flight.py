@@ -15,7 +15,14 @@ from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return, TakeOff, ToPoint, bearing
+from volery.simulation.autopilots.manoeuvres.to_point import (
+    Brake,
+    ClimbStraight,
+    DescendAndLand,
+    ReturnAndLand,
+    ToPoint,
+    bearing,
+)
 from volery.simulation.autopilots.onboard_mission import (
     CONDITION_DELAY,
     CONDITION_DISTANCE,
@@ -31,7 +38,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 
 FOREVER = -1
 
@@ -43,12 +50,12 @@ LEAST_CLIMB = 1.0
 class Leg:
     """A manoeuvre, the condition that it is done, and the time to stay then [ns]."""
 
-    manoeuvre: Manoeuvre
+    manoeuvre: FlightManoeuvre
     done: Callable[[], bool]
     stay: Ns = 0
 
 
-MakeLeg = Callable[[Vehicle, MissionItem, bool], Leg]
+MakeLeg = Callable[[AutopilotVehicle, MissionItem, bool], Leg]
 """Creates a leg from the vehicle, the item, and whether the mission goes on to a waypoint without a stop."""
 
 
@@ -66,21 +73,21 @@ class MissionRules:
     """Whether a mission that has ended begins anew when its mode is entered again."""
     reports_actions: bool = False
     """Whether ``item_done`` is called for items that do not navigate, too."""
-    item_begins: Callable[[Vehicle, int, MissionItem], None] = _ignore
-    item_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
-    act: Callable[[Vehicle, MissionItem], None] = _ignore
+    item_begins: Callable[[AutopilotVehicle, int, MissionItem], None] = _ignore
+    item_done: Callable[[AutopilotVehicle, int, MissionItem], None] = _ignore
+    act: Callable[[AutopilotVehicle, MissionItem], None] = _ignore
     """Execute an item that does not navigate."""
-    action_begins: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    action_begins: Callable[[AutopilotVehicle, int, MissionItem], None] = _ignore
     """Called for items that do not navigate: for the first before the next leg begins, for others after."""
-    action_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    action_done: Callable[[AutopilotVehicle, int, MissionItem], None] = _ignore
     """Called when they are done."""
-    jumped: Callable[[Vehicle, int, int, int], None] = _ignore
+    jumped: Callable[[AutopilotVehicle, int, int, int], None] = _ignore
     """Called with the index of a jump, how often it has been done, and how often it is to be."""
-    ended: Callable[[Vehicle], Manoeuvre | None] = _ignore
+    ended: Callable[[AutopilotVehicle], FlightManoeuvre | None] = _ignore
     """Called at the end; returns what is flown then, or ``None``."""
 
 
-class FlyMission(Manoeuvre):
+class FlyMission(FlightManoeuvre):
     """Fly the mission on board from its current item.
 
     Args:
@@ -92,10 +99,10 @@ class FlyMission(Manoeuvre):
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: AutopilotVehicle,
         make_leg: MakeLeg,
         rules: MissionRules,
-        leaves_ground: Callable[[Vehicle], bool] | None = None,
+        leaves_ground: Callable[[AutopilotVehicle], bool] | None = None,
     ) -> None:
         super().__init__(vehicle)
         self.slow_start = True
@@ -118,7 +125,7 @@ class FlyMission(Manoeuvre):
         """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
 
     @property
-    def flown(self) -> Manoeuvre:
+    def flown(self) -> FlightManoeuvre:
         """The manoeuvre of the leg, if there is one."""
         return self if self._leg is None else self._leg.manoeuvre
 
@@ -188,7 +195,7 @@ class FlyMission(Manoeuvre):
         if self._reached_at is not None and leg.stay >= 0 and now - self._reached_at >= leg.stay:
             self._finish()
 
-    def _mirror(self, manoeuvre: Manoeuvre) -> None:
+    def _mirror(self, manoeuvre: FlightManoeuvre) -> None:
         self.target, self.landing, self.taking_off = manoeuvre.target, manoeuvre.landing, manoeuvre.taking_off
 
     # -- from item to item
@@ -304,7 +311,7 @@ class FlyMission(Manoeuvre):
         return True
 
 
-class Circle(Manoeuvre):
+class FlyCircle(FlightManoeuvre):
     """Fly a circle at a height.
 
     Args:
@@ -314,7 +321,7 @@ class Circle(Manoeuvre):
         rate: Turn rate [rad/s]; negative: anticlockwise.
     """
 
-    def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, rate: float) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, centre: Vector, radius: float, rate: float) -> None:
         super().__init__(vehicle)
         self._centre, self._radius, self._rate = centre, max(1.0, radius), rate
         self._angle = 0.0
@@ -366,7 +373,7 @@ class Circle(Manoeuvre):
 # --- legs of a multirotor ----------------------------------------------------------------------------------
 
 
-def item_point(vehicle: Vehicle, item: MissionItem) -> Vector:
+def item_point(vehicle: AutopilotVehicle, item: MissionItem) -> Vector:
     """Return the point of an item; without coordinates or height, the vehicle's own."""
     here = vehicle.estimate.position
     point = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
@@ -375,13 +382,13 @@ def item_point(vehicle: Vehicle, item: MissionItem) -> Vector:
     return point if item.z else (point[0], point[1], here[2])
 
 
-def point_height(vehicle: Vehicle, item: MissionItem) -> float:
+def point_height(vehicle: AutopilotVehicle, item: MissionItem) -> float:
     """Return an item's height as down about the estimator's origin [m]."""
     latitude, longitude, _ = vehicle.estimate.geodetic
     return vehicle.point(item.frame, latitude, longitude, item.z)[2]
 
 
-def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+def copter_leg(vehicle: AutopilotVehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
         return _take_off(vehicle, item)
@@ -390,7 +397,7 @@ def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
             LandAt(vehicle, item_point(vehicle, item) if item.has_place else None), lambda: vehicle.landed
         )
     if item.command == RETURN:
-        return Leg(Return(vehicle), lambda: vehicle.landed)
+        return Leg(ReturnAndLand(vehicle), lambda: vehicle.landed)
     if item.command == LOITER_TURNS:
         return _turns(vehicle, item)
     if item.command == DELAY:
@@ -399,14 +406,14 @@ def copter_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     return _go(vehicle, item, goes_on)
 
 
-def _take_off(vehicle: Vehicle, item: MissionItem) -> Leg:
+def _take_off(vehicle: AutopilotVehicle, item: MissionItem) -> Leg:
     home = vehicle.home.ned[2] if vehicle.home else 0.0
     lowest = vehicle.height + (LEAST_CLIMB if vehicle.landed else 0.0)
-    climbing = TakeOff(vehicle, max(lowest, home - point_height(vehicle, item)))
+    climbing = ClimbStraight(vehicle, max(lowest, home - point_height(vehicle, item)))
     return Leg(climbing, climbing.arrived)
 
 
-def _go(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+def _go(vehicle: AutopilotVehicle, item: MissionItem, goes_on: bool) -> Leg:
     point = item_point(vehicle, item)
     here = vehicle.estimate.position
     away = hypot(point[0] - here[0], point[1] - here[1])
@@ -420,15 +427,15 @@ def _go(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     return Leg(going, lambda: going.arrived(passing=goes_on), stay)
 
 
-def _turns(vehicle: Vehicle, item: MissionItem) -> Leg:
+def _turns(vehicle: AutopilotVehicle, item: MissionItem) -> Leg:
     tuning = vehicle.tuning
     radius = abs(item.param3) or tuning.circle_radius
     rate = tuning.circle_rate * (-1.0 if item.param3 < 0.0 else 1.0)
-    circling = Circle(vehicle, item_point(vehicle, item), radius, rate)
+    circling = FlyCircle(vehicle, item_point(vehicle, item), radius, rate)
     return Leg(circling, lambda: circling.turned >= 2.0 * pi * item.param1)
 
 
-class LandAt(Manoeuvre):
+class LandAt(FlightManoeuvre):
     """Fly level to a point, then land there.
 
     Args:
@@ -436,9 +443,9 @@ class LandAt(Manoeuvre):
         point: The point; ``None``: land at the present position.
     """
 
-    def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector | None) -> None:
         super().__init__(vehicle)
-        self._landing = Land(vehicle, point)
+        self._landing = DescendAndLand(vehicle, point)
         self._going: ToPoint | None = None
         if point is not None:
             self._going = ToPoint(vehicle, (point[0], point[1], vehicle.estimate.position[2]))

@@ -19,7 +19,12 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction, do_nothing
+from volery.simulation.autopilots.vehicle_state import (
+    AutopilotVehicle,
+    FlightManoeuvre,
+    VehicleAction,
+    do_nothing,
+)
 
 AT_POINT = 1.0
 """Distance within which a rover that stops has arrived [m]."""
@@ -35,7 +40,7 @@ as the control loops drive forwards to a point.
 STANDING = Setpoint(Control.STEER)
 
 
-class Manual(Manoeuvre):
+class DriveBySticks(FlightManoeuvre):
     """Sticks command steering and throttle."""
 
     def step(self) -> None:
@@ -46,7 +51,7 @@ class Manual(Manoeuvre):
         self.vehicle.drive(Setpoint(Control.STEER, steering=steering, throttle=throttle))
 
 
-class Stand(Manoeuvre):
+class Stand(FlightManoeuvre):
     """Keep the wheels straight and the throttle at zero."""
 
     def step(self) -> None:
@@ -54,7 +59,7 @@ class Stand(Manoeuvre):
         self.vehicle.drive(STANDING)
 
 
-class DriveTo(Manoeuvre):
+class DriveTo(FlightManoeuvre):
     """Drive to a point and stop there, backwards where that is commanded.
 
     Args:
@@ -62,7 +67,7 @@ class DriveTo(Manoeuvre):
         point: North, east, down about the estimator's origin [m].
     """
 
-    def __init__(self, vehicle: Vehicle, point: Vector) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector) -> None:
         super().__init__(vehicle)
         self.point = self.target = point
 
@@ -99,7 +104,7 @@ class DriveTo(Manoeuvre):
         return passing or away < AT_POINT or hypot(north, east) < 0.1
 
 
-class FollowSpeed(Manoeuvre):
+class FollowSpeed(FlightManoeuvre):
     """Drive at a speed with a heading or a turn rate; stop when no command arrives for the time-out.
 
     Args:
@@ -108,7 +113,7 @@ class FollowSpeed(Manoeuvre):
         turn: Heading or turn rate.
     """
 
-    def __init__(self, vehicle: Vehicle, speed: float, turn: Turn) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, speed: float, turn: Turn) -> None:
         super().__init__(vehicle)
         self._speed, self.turn = speed, turn
         self._given: Ns = vehicle.kernel.now()
@@ -131,7 +136,7 @@ class FollowSpeed(Manoeuvre):
         )
 
 
-class GuidedRover(Manoeuvre):
+class GuidedRover(FlightManoeuvre):
     """Execute the last command.
 
     Args:
@@ -140,17 +145,19 @@ class GuidedRover(Manoeuvre):
         on_timeout: Called once the rover stops because commands are outdated.
     """
 
-    def __init__(self, vehicle: Vehicle, on_arrival: VehicleAction, on_timeout: VehicleAction) -> None:
+    def __init__(
+        self, vehicle: AutopilotVehicle, on_arrival: VehicleAction, on_timeout: VehicleAction
+    ) -> None:
         super().__init__(vehicle)
         self._on_arrival, self._on_timeout = on_arrival, on_timeout
-        self._doing: Manoeuvre = Stand(vehicle)
+        self._doing: FlightManoeuvre = Stand(vehicle)
         self._reported = True
 
     def enter(self) -> None:
         """Stop until a command arrives."""
         self._begin(Stand(self.vehicle))
 
-    def _begin(self, doing: Manoeuvre) -> None:
+    def _begin(self, doing: FlightManoeuvre) -> None:
         self._doing, self._reported = doing, False
         self.target = doing.target
         if self.vehicle.armed:
@@ -184,7 +191,7 @@ class GuidedRover(Manoeuvre):
         return doing.turn.yaw if isinstance(doing, FollowSpeed) else None
 
 
-class ReturnRover(Manoeuvre):
+class ReturnRover(FlightManoeuvre):
     """Drive home, or where the firmware returns instead, and stop.
 
     Args:
@@ -192,7 +199,7 @@ class ReturnRover(Manoeuvre):
         on_arrival: Called once home is reached.
     """
 
-    def __init__(self, vehicle: Vehicle, on_arrival: VehicleAction = do_nothing) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, on_arrival: VehicleAction = do_nothing) -> None:
         super().__init__(vehicle)
         self._on_arrival, self._reported = on_arrival, False
         self._arrived_at: Ns | None = None
@@ -219,7 +226,7 @@ class ReturnRover(Manoeuvre):
         return self._driving.arrived()
 
 
-def rover_leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+def rover_leg(vehicle: AutopilotVehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of a rover for an item that navigates."""
     if item.command == RETURN:
         returning = ReturnRover(vehicle)

@@ -8,7 +8,7 @@ from volery.base.elementary import atan2, cbrt
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 
 CLOSE = 0.1
 """Distance within which a height or a shaped target counts as reached [m]."""
@@ -78,7 +78,7 @@ def quarter_time(length: float, jerk: float) -> float:
     return cbrt(length / (2.0 * jerk))
 
 
-def direction_of_flight(vehicle: Vehicle) -> float | None:
+def direction_of_flight(vehicle: AutopilotVehicle) -> float | None:
     """Return the direction in which the target moves, clockwise from north [rad]; ``None``: it is slow."""
     north, east, _ = vehicle.estimate.target_velocity
     fast = hypot(north, east) > FACING_SHARE * vehicle.tuning.speed
@@ -90,7 +90,7 @@ def bearing(start: Vector, end: Vector) -> float:
     return atan2(end[1] - start[1], end[0] - start[0])
 
 
-class ToPoint(Manoeuvre):
+class ToPoint(FlightManoeuvre):
     """Go to a point with limited speed and hold it.
 
     Args:
@@ -102,7 +102,7 @@ class ToPoint(Manoeuvre):
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: AutopilotVehicle,
         point: Vector | None = None,
         yaw: float | None = None,
         *,
@@ -161,7 +161,7 @@ class ToPoint(Manoeuvre):
         return near and (passing or dist(estimate.target, self.point) < CLOSE)
 
 
-class TakeOff(ToPoint):
+class ClimbStraight(ToPoint):
     """Climb straight up.
 
     Args:
@@ -169,7 +169,7 @@ class TakeOff(ToPoint):
         height: Height above home [m].
     """
 
-    def __init__(self, vehicle: Vehicle, height: float) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, height: float) -> None:
         super().__init__(vehicle)
         self.taking_off = self.slow_start = True
         self.height = height
@@ -189,7 +189,7 @@ class TakeOff(ToPoint):
         return self.vehicle.height > self.height - CLOSE
 
 
-class Land(Manoeuvre):
+class DescendAndLand(FlightManoeuvre):
     """Descend straight down: fast while high, slowly near the ground. Without a position it descends level.
 
     Args:
@@ -197,7 +197,7 @@ class Land(Manoeuvre):
         point: Point to land below; ``None``: where the vehicle can stop.
     """
 
-    def __init__(self, vehicle: Vehicle, point: Vector | None = None) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector | None = None) -> None:
         super().__init__(vehicle)
         self.landing = True
         self.point = point
@@ -242,12 +242,12 @@ class Land(Manoeuvre):
         )
 
 
-class Return(Manoeuvre):
+class ReturnAndLand(FlightManoeuvre):
     """Climb, fly home, wait, land: each stage is a manoeuvre of its own."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._stage: Manoeuvre = ToPoint(vehicle)
+        self._stage: FlightManoeuvre = ToPoint(vehicle)
         self._name = ""
         self._home: Vector = (0.0, 0.0, 0.0)
         self._waiting_since: Ns = 0
@@ -273,7 +273,7 @@ class Return(Manoeuvre):
             target_height = min(target_height, max(away * tuning.return_cone, 2.0))
         return max(height, target_height)
 
-    def _begin(self, name: str, stage: Manoeuvre) -> None:
+    def _begin(self, name: str, stage: FlightManoeuvre) -> None:
         self._name, self._stage = name, stage
         if isinstance(stage, ToPoint) and name != "climb":
             stage.speed = self.vehicle.tuning.return_speed
@@ -300,10 +300,10 @@ class Return(Manoeuvre):
             ground = self.vehicle.home.ned[2] if self.vehicle.home else 0.0
             self._begin("final", ToPoint(self.vehicle, (north, east, ground - final)))
         else:
-            self._begin("land", Land(self.vehicle, (north, east, down)))
+            self._begin("land", DescendAndLand(self.vehicle, (north, east, down)))
 
 
-class Brake(Manoeuvre):
+class Brake(FlightManoeuvre):
     """Stop, and hold the position that is reached.
 
     Args:
@@ -311,7 +311,7 @@ class Brake(Manoeuvre):
         accel: Deceleration [m/s^2]; by default that of BRAKE.
     """
 
-    def __init__(self, vehicle: Vehicle, accel: float = BRAKE_ACCEL) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, accel: float = BRAKE_ACCEL) -> None:
         super().__init__(vehicle)
         self._accel = accel
 

@@ -11,7 +11,7 @@ from math import dist
 from volery.base.frames import Vector
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import INFO
 
 
@@ -22,7 +22,7 @@ class ZigZag(Loiter):
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._stored: dict[str, Vector] = {}
         self._going: ToPoint | None = None

@@ -27,7 +27,7 @@ from volery.simulation.autopilots.mavlink.microservices import (
     ParameterService,
 )
 from volery.simulation.autopilots.mavlink.routing import Routes
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import Text
 
 Handler = Callable[[Peer, dict[str, Any]], None]
@@ -44,7 +44,7 @@ class MavlinkEndpoint:
         vehicle: The vehicle.
     """
 
-    def __init__(self, firmware: MavlinkFirmware, vehicle: Vehicle) -> None:
+    def __init__(self, firmware: MavlinkFirmware, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self.firmware = firmware
         self._kernel = vehicle.kernel

@@ -17,7 +17,7 @@ from volery.base.time import MS, Ns
 from volery.kernel.api import Handle
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.onboard_log import FlightLog
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 NONE, END, RESET, LIST, OPEN, READ, CHECKSUM, BURST = 0, 1, 2, 3, 4, 5, 14, 15
 WRITES = frozenset(range(6, 14))
@@ -42,7 +42,7 @@ Encode = Callable[[FlightLog], bytes]
 class FilePolicy(NamedTuple):
     """What differs between firmwares."""
 
-    files: Callable[[Vehicle, Encode], Mapping[str, Content]]
+    files: Callable[[AutopilotVehicle, Encode], Mapping[str, Content]]
     """Return the files by their paths from the root, given how a log is encoded."""
     relative: bool
     """Whether a path may lack its first slash; an empty one then is no name of a folder."""
@@ -89,7 +89,7 @@ class FileService:
         encode: Returns a log of the vehicle as a file.
     """
 
-    def __init__(self, vehicle: Vehicle, policy: FilePolicy, encode: Encode) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, policy: FilePolicy, encode: Encode) -> None:
         self._vehicle = vehicle
         self._policy = policy
         self._encode = encode

@@ -16,7 +16,7 @@ from volery.simulation.autopilots.mavlink.file_service import FilePolicy
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, VehicleAction, do_nothing
 
 
 def _always(*_question: object) -> bool:
@@ -68,7 +68,7 @@ CANCELLED = 15
 """MAV_MISSION_RESULT."""
 
 
-def _cancel(vehicle: Vehicle) -> int:
+def _cancel(vehicle: AutopilotVehicle) -> int:
     vehicle.send_text(4, "Mission upload timeout")
     return CANCELLED
 
@@ -88,29 +88,29 @@ class MissionUploadPolicy(NamedTuple):
     """Period at which an item that does not arrive is requested again."""
     gives_up_after: Ns = 8 * S
     """Time without an item after which the upload ends."""
-    gives_up: Callable[[Vehicle], int | None] = _cancel
+    gives_up: Callable[[AutopilotVehicle], int | None] = _cancel
     """Reports that; returns the MAV_MISSION_RESULT that is acknowledged, or ``None``."""
 
 
-Builder = Callable[[Vehicle], dict[str, Any] | list[dict[str, Any]] | None]
+Builder = Callable[[AutopilotVehicle], dict[str, Any] | list[dict[str, Any]] | None]
 """Returns the fields of a message as sent now, a list where several are sent at once, or ``None`` while the
 firmware does not send it.
 """
 
-MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
+MessageHandler = Callable[[AutopilotVehicle, dict[str, Any], int], None]
 """Handles a message that needs no answer: vehicle, fields, system id of the sender."""
 
 
-QuestionHandler = Callable[[Vehicle, dict[str, Any], Peer], None]
+QuestionHandler = Callable[[AutopilotVehicle, dict[str, Any], Peer], None]
 """Answers a message: vehicle, fields, sender."""
 
 
 class HighLatency(NamedTuple):
     """Links that carry HIGH_LATENCY2 instead of HEARTBEAT, and nothing while they are muted."""
 
-    links: Callable[[Vehicle], frozenset[int]]
+    links: Callable[[AutopilotVehicle], frozenset[int]]
     """Returns their numbers."""
-    muted: Callable[[Vehicle], bool]
+    muted: Callable[[AutopilotVehicle], bool]
 
 
 class BootBytes(NamedTuple):
@@ -142,7 +142,7 @@ class TelemetryPolicy:
     """Order of the messages within one burst."""
     streams: Mapping[int, Sequence[str]] = field(default_factory=dict)
     """The messages of each MAV_DATA_STREAM; empty where REQUEST_DATA_STREAM is not supported."""
-    on_stream_request: Callable[[Vehicle, int, int, int], None] = _ignore
+    on_stream_request: Callable[[AutopilotVehicle, int, int, int], None] = _ignore
     """Called with the vehicle, the index of the link, the stream and its rate [Hz]."""
     link_uses: Mapping[str, Mapping[str, Ns]] = field(default_factory=lambda: {"": {}})
     """What a link is used for, to the periods of its unrequested streams. The first use is the default."""
@@ -152,7 +152,7 @@ class TelemetryPolicy:
     """Shortest period of a stream."""
     intervals_after: Ns = 0
     """Before that uptime message intervals are acknowledged and ignored."""
-    refuse_interval: Callable[[Vehicle, int], int]
+    refuse_interval: Callable[[AutopilotVehicle, int], int]
     """Return the MAV_RESULT of an interval for an unknown message number."""
     unknown_message: int
     """MAV_RESULT of a request for an unknown message."""
@@ -163,7 +163,7 @@ class TelemetryPolicy:
     on_home_change: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")
     """Messages that a change of the home position sends at once on all links."""
 
-    def build(self, name: str, vehicle: Vehicle) -> list[dict[str, Any]]:
+    def build(self, name: str, vehicle: AutopilotVehicle) -> list[dict[str, Any]]:
         """Return the fields of each message called *name* that is sent now."""
         built = self.messages[name](vehicle)
         if isinstance(built, list):
@@ -180,7 +180,7 @@ class CommandPolicy:
     """Messages for this vehicle that need no answer."""
     questions: Mapping[str, QuestionHandler] = field(default_factory=dict)
     """Messages for this vehicle that are answered with a message."""
-    set_mode: Callable[[Vehicle, int, int], int]
+    set_mode: Callable[[AutopilotVehicle, int, int], int]
     """Handle SET_MODE (base mode, custom mode) and return a MAV_RESULT."""
     set_mode_ack: int
     """Number of the command that acknowledges SET_MODE."""
@@ -189,9 +189,9 @@ class CommandPolicy:
     """MAV_RESULT of a command for another system or component; ``None``: no answer."""
     checks_component: bool = False
     """Whether a message for another component is not handled; else the component is ignored."""
-    accepts: Callable[[Vehicle, str, int], bool] = _always
+    accepts: Callable[[AutopilotVehicle, str, int], bool] = _always
     """Whether a message, by its name and the system that sends it, is handled at all."""
-    private_links: Callable[[Vehicle], frozenset[int]] | None = None
+    private_links: Callable[[AutopilotVehicle], frozenset[int]] | None = None
     """Numbers of the links between which and others nothing is forwarded; ``None``: nothing ever is."""
     reads_nan: bool = False
     """Whether a NaN parameter of a command means that the parameter is not given."""
@@ -204,29 +204,29 @@ class MissionPolicy:
     """How missions are stored and read back."""
 
     upload: MissionUploadPolicy = field(default_factory=MissionUploadPolicy)
-    runs: Callable[[Vehicle], bool] = _never
+    runs: Callable[[AutopilotVehicle], bool] = _never
     """Whether the mission may not be cleared now."""
     stored_item: Callable[[MissionItem], MissionItem | int]
     """Return an uploaded item as it is stored, or the MAV_MISSION_RESULT that refuses it."""
-    home_item: Callable[[Vehicle], MissionItem | None] = do_nothing
+    home_item: Callable[[AutopilotVehicle], MissionItem | None] = do_nothing
     """Return item 0 where the firmware stores its home position there."""
-    go_to_item: Callable[[Vehicle, MissionItem], bool] = _never
+    go_to_item: Callable[[AutopilotVehicle, MissionItem], bool] = _never
     """Fly to an item that is sent outside an upload (``current`` 2)."""
-    grew: Callable[[Vehicle, int], None] = _ignore
+    grew: Callable[[AutopilotVehicle, int], None] = _ignore
     """Called with the number of items after a change."""
     stored_point: Callable[[int, MissionItem], MissionItem | int] | None = None
     """The same as ``stored_item`` for the points of the fence and for rally points, by MAV_MISSION_TYPE;
     ``None``: they are not supported.
     """
-    refuses_points: Callable[[Vehicle, int, list[MissionItem]], bool] = _admit
+    refuses_points: Callable[[AutopilotVehicle, int, list[MissionItem]], bool] = _admit
     """Reports why a complete list of points is refused, and returns whether it is."""
     names_lists: bool = True
     """Whether items of the fence and rally points are sent with their MAV_MISSION_TYPE."""
-    points_changed: Callable[[Vehicle, int], None] = _ignore
+    points_changed: Callable[[AutopilotVehicle, int], None] = _ignore
     """Called after such a list has changed, with its MAV_MISSION_TYPE."""
     writes_parts: bool = False
     """Whether MISSION_WRITE_PARTIAL_LIST replaces a part of the mission."""
-    list_id: Callable[[Vehicle, int], int] | None = None
+    list_id: Callable[[AutopilotVehicle, int], int] | None = None
     """Return the checksum of a list by its MAV_MISSION_TYPE; ``None``: acknowledgements carry none."""
     item_refused: VehicleAction = do_nothing
     """Called when an uploaded item is refused."""

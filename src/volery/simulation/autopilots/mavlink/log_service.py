@@ -15,7 +15,7 @@ from volery.kernel.api import Handle
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import WARNING
 
 PIECE = 90
@@ -55,7 +55,7 @@ class LogService:
         policy: What differs between firmwares.
     """
 
-    def __init__(self, vehicle: Vehicle, policy: LogPolicy) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, policy: LogPolicy) -> None:
         self._vehicle = vehicle
         self._policy = policy
         self._transfer: _Transfer | None = None

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from volery.base.time import MS, US
 from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 Fields = dict[str, Any]
 
@@ -54,17 +54,17 @@ MULTIROTORS = {4: 2, 6: 13, 8: 14}
 """MAV_TYPE by the number of rotors: quadrotor, hexarotor, octorotor."""
 
 
-def vehicle_type(vehicle: Vehicle, kind: int) -> int:
+def vehicle_type(vehicle: AutopilotVehicle, kind: int) -> int:
     """Return the MAV_TYPE of a vehicle: that of its rotors, *kind* of one without."""
     return MULTIROTORS.get(vehicle.flight.rotors, kind)
 
 
-def boot_ms(vehicle: Vehicle) -> int:
+def boot_ms(vehicle: AutopilotVehicle) -> int:
     """Return the field ``time_boot_ms``, which begins anew after 49.7 days."""
     return to_uint32(vehicle.uptime() // MS)
 
 
-def boot_us(vehicle: Vehicle) -> int:
+def boot_us(vehicle: AutopilotVehicle) -> int:
     """Return a field ``time_usec`` of 64 bits, counted from boot."""
     return vehicle.uptime() // US
 
@@ -74,7 +74,7 @@ def heading_cdeg(yaw: float) -> int:
     return round(degrees(yaw) * 100.0) % 36_000
 
 
-def attitude(vehicle: Vehicle) -> Fields:
+def attitude(vehicle: AutopilotVehicle) -> Fields:
     """Return the fields of ATTITUDE."""
     estimate = vehicle.estimate
     roll, pitch, yaw = estimate.attitude
@@ -90,7 +90,7 @@ def attitude(vehicle: Vehicle) -> Fields:
     }
 
 
-def attitude_quaternion(vehicle: Vehicle) -> Fields:
+def attitude_quaternion(vehicle: AutopilotVehicle) -> Fields:
     """Return the fields of ATTITUDE_QUATERNION."""
     estimate = vehicle.estimate
     w, x, y, z = estimate.quaternion
@@ -157,7 +157,7 @@ class Command(NamedTuple):
         return float(round(self.y * 1e7)) if self.is_int and isfinite(self.y) else finite(self.y)
 
 
-Handler = Callable[[Vehicle, Command], int | None]
+Handler = Callable[[AutopilotVehicle, Command], int | None]
 """Executes a command and returns a MAV_RESULT; ``None``: the command stays without an answer."""
 
 

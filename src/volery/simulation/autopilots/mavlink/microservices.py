@@ -16,7 +16,7 @@ from zlib import crc32
 from volery.base.time import MS, US, Ns
 from volery.kernel.api import Handle
 from volery.links.mavlink_messages import constant, from_bytewise, message_type_of, to_bytewise
-from volery.simulation.autopilots.autopilot_parameters import Parameter, quantised
+from volery.simulation.autopilots.autopilot_parameters import StoredParameter, quantised
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
 from volery.simulation.autopilots.mavlink.messages import (
@@ -29,7 +29,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     from_long,
 )
 from volery.simulation.autopilots.onboard_mission import MissionItem, coordinate_scale
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 # --- commands ---
 
@@ -46,7 +46,7 @@ LARGEST_REPORTED = 65_535
 class CommandService:
     """Command protocol of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, firmware: MavlinkFirmware) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, firmware: MavlinkFirmware) -> None:
         self._vehicle = vehicle
         self._firmware = firmware
         self._own: dict[int, Callable[[Peer, Command], int]] = {
@@ -148,7 +148,7 @@ _REAL = struct.Struct("<f")
 class ParameterService:
     """Parameter protocol of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, policy: ParameterPolicy) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, policy: ParameterPolicy) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
         self._policy = policy
@@ -163,7 +163,7 @@ class ParameterService:
         keeps = self._policy.keeps_index
         return self._fields(found, self._vehicle.parameters.index(name) if keeps else UNSOLICITED)
 
-    def _fields(self, parameter: Parameter, index: int) -> dict[str, Any]:
+    def _fields(self, parameter: StoredParameter, index: int) -> dict[str, Any]:
         name, kind, value, _ = parameter
         return {
             "param_id": name,
@@ -173,12 +173,12 @@ class ParameterService:
             "param_index": index,
         }
 
-    def _checksum(self) -> Parameter:
+    def _checksum(self) -> StoredParameter:
         """Return a checksum over names and values as a parameter."""
         total = 0
         for name, kind, value, _ in self._vehicle.parameters:
             total = crc32(name.encode() + _REAL.pack(to_bytewise(kind, value)), total)
-        return Parameter(self._policy.checksum, UINT32, float(total))
+        return StoredParameter(self._policy.checksum, UINT32, float(total))
 
     def on_list(self, peer: Peer, _fields: dict[str, Any]) -> None:
         """Handle PARAM_REQUEST_LIST."""
@@ -259,7 +259,7 @@ def _to_int32(value: float) -> int:
 
 
 @dataclass
-class _Upload:
+class _MissionUpload:
     peer: Peer
     count: int
     latest: Ns
@@ -277,11 +277,11 @@ class _Upload:
 class MissionService:
     """Mission protocol of one vehicle. A new upload replaces one in progress."""
 
-    def __init__(self, vehicle: Vehicle, firmware: MavlinkFirmware) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, firmware: MavlinkFirmware) -> None:
         self._vehicle = vehicle
         self._firmware = firmware
         self._kernel = vehicle.kernel
-        self._upload: _Upload | None = None
+        self._upload: _MissionUpload | None = None
 
     # -- upload
 
@@ -299,7 +299,7 @@ class MissionService:
         else:
             if kind == MISSION and not self._firmware.missions.upload.keeps_old:
                 self._vehicle.mission.clear()
-            self._upload = _Upload(peer, fields["count"], self._kernel.now(), kind)
+            self._upload = _MissionUpload(peer, fields["count"], self._kernel.now(), kind)
             self._request_item()
 
     def on_partial(self, peer: Peer, fields: dict[str, Any]) -> None:
@@ -312,7 +312,7 @@ class MissionService:
             self._vehicle.send_text(4, "Flight plan update rejected")
             self._acknowledge(peer, MISSION_ERROR)
         else:
-            self._upload = _Upload(peer, last - first + 1, self._kernel.now(), first=first, part=True)
+            self._upload = _MissionUpload(peer, last - first + 1, self._kernel.now(), first=first, part=True)
             self._request_item()
 
     def _stores(self, kind: int) -> bool:
@@ -386,7 +386,7 @@ class MissionService:
         else:
             self._store(self._upload, item)
 
-    def _store(self, upload: _Upload, item: MissionItem) -> None:
+    def _store(self, upload: _MissionUpload, item: MissionItem) -> None:
         convert = self._firmware.missions.stored_point
         if upload.kind == MISSION or convert is None:
             stored = self._firmware.missions.stored_item(item)
@@ -408,7 +408,7 @@ class MissionService:
         if upload.kind == MISSION and not upload.part:
             self._firmware.missions.grew(self._vehicle, len(upload.items))
 
-    def _finish(self, upload: _Upload) -> None:
+    def _finish(self, upload: _MissionUpload) -> None:
         """Put a complete upload in force and acknowledge it."""
         self._upload = None
         if upload.kind != MISSION:

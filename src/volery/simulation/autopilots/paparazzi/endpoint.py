@@ -16,7 +16,7 @@ from volery.kernel.api import Action, Handle
 from volery.links.frame import Frame
 from volery.links.link import Link
 from volery.simulation.autopilots.paparazzi import modes, parameters, rotorcraft_state
-from volery.simulation.autopilots.paparazzi.flight_modes import Guided
+from volery.simulation.autopilots.paparazzi.flight_modes import GuidedMode
 from volery.simulation.autopilots.paparazzi.parameters import AUTO1_SWITCH, AUTO2_SWITCH, MANUAL_SWITCH
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import (
     FULL,
@@ -31,7 +31,7 @@ from volery.simulation.autopilots.paparazzi.telemetry import (
     is_listed,
     waypoint,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import Text
 
 Fields = dict[str, Any]
@@ -40,24 +40,24 @@ MANUAL_BELOW, AUTO2_ABOVE = -FULL // 2, FULL // 2
 """Limits of the mode switch."""
 
 
-def on_ping(vehicle: Vehicle, _fields: Fields) -> None:
+def on_ping(vehicle: AutopilotVehicle, _fields: Fields) -> None:
     """Handle PING."""
     vehicle.output.send_event("PONG", {})
 
 
-def on_setting(vehicle: Vehicle, fields: Fields) -> None:
+def on_setting(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle SETTING: write, and send the new value."""
     value = parameters.write_setting(vehicle, fields["index"], fields["value"])
     vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
-def on_get_setting(vehicle: Vehicle, fields: Fields) -> None:
+def on_get_setting(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle GET_SETTING."""
     value = parameters.read_setting(vehicle, fields["index"])
     vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
-def on_block(vehicle: Vehicle, fields: Fields) -> None:
+def on_block(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle BLOCK, which changes the block in any mode; only NAV flies it.
 
     A number beyond the plan means its last block.
@@ -66,26 +66,26 @@ def on_block(vehicle: Vehicle, fields: Fields) -> None:
     navigation.jump(min(fields["block_id"], len(navigation.plan.blocks) - 1))
 
 
-def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
+def on_move_waypoint(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle MOVE_WP (1e-7 deg, mm AMSL), which is ignored without a local frame."""
     if not vehicle.estimate.position_ok:
         return
-    place = vehicle.flight.to_ned(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
-    if state_of(vehicle).navigation.move(fields["wp_id"], ned_to_enu(place)):
+    ned = vehicle.flight.to_ned(fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0)
+    if state_of(vehicle).navigation.move(fields["wp_id"], ned_to_enu(ned)):
         vehicle.output.send_event("WP_MOVED_ENU", waypoint(vehicle, fields["wp_id"]))
 
 
-def on_guided(vehicle: Vehicle, fields: Fields) -> None:
+def on_guided(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle GUIDED_SETPOINT_NED: ignored in every mode but GUIDED, and obeyed there whatever it says."""
     manoeuvre = vehicle.manoeuvre
-    if isinstance(manoeuvre, Guided):
+    if isinstance(manoeuvre, GuidedMode):
         manoeuvre.follow(fields["flags"], (fields["x"], fields["y"], fields["z"]), fields["yaw"])
 
 
 # -- sticks
 
 
-def on_channels(vehicle: Vehicle, fields: Fields) -> None:
+def on_channels(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle RC_UP: channels roll, pitch, yaw, throttle, mode; a shorter frame is ignored."""
     channels = fields["channels"]
     if len(channels) >= len(StickFrame._fields):
@@ -94,13 +94,13 @@ def on_channels(vehicle: Vehicle, fields: Fields) -> None:
         _receive(vehicle, frame)
 
 
-def on_joystick(vehicle: Vehicle, fields: Fields) -> None:
+def on_joystick(vehicle: AutopilotVehicle, fields: Fields) -> None:
     """Handle JOYSTICK_RAW, with the mode switch at AUTO2."""
     roll, pitch, yaw = (bounded(fields[name]) for name in ("roll", "pitch", "yaw"))
     _receive(vehicle, StickFrame(roll, pitch, yaw, bounded(fields["throttle"], 0), FULL))
 
 
-def _receive(vehicle: Vehicle, frame: StickFrame) -> None:
+def _receive(vehicle: AutopilotVehicle, frame: StickFrame) -> None:
     """Apply a frame of radio control: first the mode switch, then the sticks."""
     state_of(vehicle).radio.receive(vehicle, frame)
     _switch(vehicle, frame.mode)
@@ -108,7 +108,7 @@ def _receive(vehicle: Vehicle, frame: StickFrame) -> None:
         vehicle.run_manoeuvre()
 
 
-def _switch(vehicle: Vehicle, position: int) -> None:
+def _switch(vehicle: AutopilotVehicle, position: int) -> None:
     """Apply the mode switch.
 
     MANUAL always counts, the other positions not in HOME or FAILSAFE, and NAV not without a GPS fix.
@@ -122,7 +122,7 @@ def _switch(vehicle: Vehicle, position: int) -> None:
         modes.set_mode(vehicle, wanted)
 
 
-HANDLERS: Mapping[str, Callable[[Vehicle, Fields], None]] = {
+HANDLERS: Mapping[str, Callable[[AutopilotVehicle, Fields], None]] = {
     "BLOCK": on_block,
     "GET_SETTING": on_get_setting,
     "GUIDED_SETPOINT_NED": on_guided,
@@ -149,7 +149,7 @@ class PaparazziEndpoint:
     banner = b""
     """Empty: the firmware sends frames only."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self._kernel = vehicle.kernel
         self._links: list[Link] = []

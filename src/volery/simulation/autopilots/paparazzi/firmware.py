@@ -24,23 +24,23 @@ from volery.simulation.autopilots.paparazzi.flight_modes import (
     FailsafeDescent,
     FlyHome,
     FlyPlan,
-    Guided,
+    GuidedMode,
     HoldHeight,
-    HoldPlace,
+    HoverHold,
     Killed,
 )
 from volery.simulation.autopilots.paparazzi.flight_plan import (
-    Block,
-    Circle,
+    CircleWaypoint,
     Condition,
     Deroute,
     FlightPlan,
     Go,
     Heading,
-    Idle,
+    MotorsIdle,
     Navigation,
     Once,
     Oval,
+    PlanBlock,
     Stay,
     While,
 )
@@ -54,11 +54,11 @@ from volery.simulation.autopilots.paparazzi.rotorcraft_state import (
 )
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
+    AutopilotVehicle,
     Mode,
     ParameterTable,
     RcDefaults,
     StartupTimes,
-    Vehicle,
     VehicleRules,
 )
 
@@ -106,25 +106,26 @@ _KILL = Once(partial(motors, on=False))
 _RESURRECT = Once(partial(motors, on=True))
 
 WAYPOINTS: dict[str, Vector] = {
-    one.name: (one.east, one.north, HEIGHTS_M.get(one.name, HEIGHT_M)) for one in stock_aircraft().waypoints
+    waypoint.name: (waypoint.east, waypoint.north, HEIGHTS_M.get(waypoint.name, HEIGHT_M))
+    for waypoint in stock_aircraft().waypoints
 }
 
 PLAN = FlightPlan(
     WAYPOINTS,
     (
-        Block("Wait GPS", (_KILL, While(lambda nav: not fix_is_valid(nav.vehicle)))),
-        Block("Geo init", (While(lambda nav: nav.block_time < SETTLED_S), Once(set_ground_reference))),
-        Block("Holding point", (_KILL, Idle())),
-        Block("Start Engine", (_RESURRECT, Idle())),
-        Block(
+        PlanBlock("Wait GPS", (_KILL, While(lambda nav: not fix_is_valid(nav.vehicle)))),
+        PlanBlock("Geo init", (While(lambda nav: nav.block_time < SETTLED_S), Once(set_ground_reference))),
+        PlanBlock("Holding point", (_KILL, MotorsIdle())),
+        PlanBlock("Start Engine", (_RESURRECT, MotorsIdle())),
+        PlanBlock(
             "Takeoff",
             (Once(lambda nav: nav.set_here("CLIMB")), Stay("CLIMB", climb="NAV_CLIMB_VSPEED")),
             ((lambda nav: nav.position[2] > AWAY_FROM_GROUND_M, "Standby"),),
         ),
-        Block("Standby", (Stay("STDBY"),)),
-        Block("stay_p1", (Stay("p1"),)),
-        Block("go_p2", (Go("p2"), Deroute("stay_p1"))),
-        Block(
+        PlanBlock("Standby", (Stay("STDBY"),)),
+        PlanBlock("stay_p1", (Stay("p1"),)),
+        PlanBlock("go_p2", (Go("p2"), Deroute("stay_p1"))),
+        PlanBlock(
             "line_p1_p2",
             (
                 Go("p2", start="p1"),
@@ -133,12 +134,12 @@ PLAN = FlightPlan(
                 Deroute("stay_p1"),
             ),
         ),
-        Block(
+        PlanBlock(
             "route",
             (Go("p3", start="p1"), Go("p4", start="p3"), Go("p1", start="p4"), Deroute("stay_p1")),
         ),
-        Block("Oval", (Oval("p1", "p2"),)),
-        Block(
+        PlanBlock("Oval", (Oval("p1", "p2"),)),
+        PlanBlock(
             "test yaw",
             (
                 Go("p1"),
@@ -146,16 +147,16 @@ PLAN = FlightPlan(
                 Deroute("Standby"),
             ),
         ),
-        Block("circle CAM", (Circle("CAM"),)),
-        Block("land here", (Once(lambda nav: nav.set_here("TD")),)),
-        Block("land", (Go("TD"),)),
-        Block(
+        PlanBlock("circle CAM", (CircleWaypoint("CAM"),)),
+        PlanBlock("land here", (Once(lambda nav: nav.set_here("TD")),)),
+        PlanBlock("land", (Go("TD"),)),
+        PlanBlock(
             "flare",
             (Once(await_touch_down), Stay("TD", climb="NAV_DESCEND_VSPEED")),
             ((touched_down, "Holding point"), (lambda nav: not in_flight(nav.vehicle), "landed")),
         ),
-        Block("landed", (Idle(),)),
-        Block("HOME", (Stay("HOME"),)),
+        PlanBlock("landed", (MotorsIdle(),)),
+        PlanBlock("HOME", (Stay("HOME"),)),
     ),
 )
 
@@ -175,32 +176,32 @@ MODES = {
         Mode(4, "ATTITUDE_DIRECT", 0, Direct, pilot=True, manual_throttle=True),
         Mode(6, "ATTITUDE_RC_CLIMB", 0, ClimbByStick, pilot=True),
         Mode(9, "ATTITUDE_Z_HOLD", 0, HoldHeight, pilot=True),
-        Mode(12, "HOVER_Z_HOLD", 0, HoldPlace, pilot=True, needs_position=True),
+        Mode(12, "HOVER_Z_HOLD", 0, HoverHold, pilot=True, needs_position=True),
         Mode(13, "NAV", 0, FlyPlan, needs_position=True),
-        Mode(19, "GUIDED", 0, Guided, needs_position=True),
+        Mode(19, "GUIDED", 0, GuidedMode, needs_position=True),
     )
 }
 """The modes of this build of the firmware. Heartbeat bits are MAVLink's and stay 0."""
 
 
-def rotorcraft_state(vehicle: Vehicle) -> RotorcraftState:
+def rotorcraft_state(vehicle: AutopilotVehicle) -> RotorcraftState:
     """Return a flight plan at its start without radio control."""
     return RotorcraftState(Navigation(vehicle, PLAN))
 
 
-def finish_boot(vehicle: Vehicle) -> None:
+def finish_boot(vehicle: AutopilotVehicle) -> None:
     """Put the vehicle on the ground in its start-up mode."""
     vehicle.ground.landed = True
     set_mode(vehicle, round(vehicle.parameters["MODE_STARTUP"]))
 
 
-def start_warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: AutopilotVehicle) -> None:
     """Start at block Holding point."""
     finish_boot(vehicle)
     state_of(vehicle).navigation.jump(HOLDING_POINT)
 
 
-def on_step(vehicle: Vehicle) -> None:
+def on_step(vehicle: AutopilotVehicle) -> None:
     """Run GPS, flight plan and flight time; without motors on the ground the vehicle counts as landed."""
     update_fix(vehicle)
     navigation = state_of(vehicle).navigation
@@ -233,7 +234,7 @@ ROTORCRAFT = Firmware(
         rc=RcDefaults((1500, 1500, 1000, 1500)),
         firmware_state=rotorcraft_state,
     ),
-    boot=BootSequence((BootEvent(READY, finish_boot),), start_warm, Vehicle.set_home_here),
+    boot=BootSequence((BootEvent(READY, finish_boot),), start_warm, AutopilotVehicle.set_home_here),
     periodic=PeriodicWork(tick=TICK, on_step=on_step, failsafe_ticks=1),
     failsafes=FAILSAFES,
     endpoint=PaparazziEndpoint,

@@ -13,17 +13,17 @@ from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
-from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
+from volery.simulation.autopilots.paparazzi.flight_plan import PlanDemand, Vertical
 from volery.simulation.autopilots.paparazzi.guidance_loops import (
     CLIMB_GAIN,
     HEIGHT_GAIN,
     SUBSTEP,
     GuidanceLoops,
-    Limits,
+    SpeedLimits,
     as_obeyed,
 )
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
-from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, AutopilotVehicle, FlightManoeuvre
 
 LIFT_OFF_M = 0.3
 """Height [m] above which the plan's target takes a standing vehicle off the ground."""
@@ -44,13 +44,13 @@ TURN_GAIN, TURN_BRAKE = 3.5, 2.4
 """Approach to a heading [1/s, rad/s^2]: 90 degrees within 3 were recorded after 1.15 s, 180 after 2.15 s."""
 
 
-class Guidance(Manoeuvre):
+class Guidance(FlightManoeuvre):
     """A manoeuvre that the firmware's guidance loops fly, with their overshoot."""
 
     RESTART_AFTER: Ns = 500 * MS
     """Time without a step after which the loops start anew."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._loops: GuidanceLoops | None = None
         self._last_step_ns: Ns = 0
@@ -106,9 +106,9 @@ class Guidance(Manoeuvre):
             )
         )
 
-    def _limits(self) -> Limits:
+    def _limits(self) -> SpeedLimits:
         tuning = self.vehicle.tuning
-        return Limits(tuning.speed, tuning.speed_up, tuning.speed_down)
+        return SpeedLimits(tuning.speed, tuning.speed_up, tuning.speed_down)
 
     def _turn_to(self, yaw: float) -> float:
         """Return the turn rate towards a heading [rad/s]."""
@@ -134,7 +134,7 @@ class Guidance(Manoeuvre):
         return steps
 
 
-class Killed(Manoeuvre):
+class Killed(FlightManoeuvre):
     """KILL: motors off."""
 
     def step(self) -> None:
@@ -142,7 +142,7 @@ class Killed(Manoeuvre):
         self.vehicle.drive(IDLE)
 
 
-class FailsafeDescent(Manoeuvre):
+class FailsafeDescent(FlightManoeuvre):
     """FAILSAFE: level, drifting with the wind, at FAILSAFE_DESCENT_SPEED; v6.2 keeps its height."""
 
     def step(self) -> None:
@@ -163,7 +163,7 @@ class FlyPlan(Guidance):
         state_of(self.vehicle).navigation.heading = self.vehicle.estimate.attitude[2]
 
     @property
-    def demand(self) -> Demand:
+    def demand(self) -> PlanDemand:
         """Present demand of the flight plan."""
         return state_of(self.vehicle).navigation.demand
 
@@ -218,7 +218,7 @@ class ClimbByStick(AltitudeHold):
     which the mode began, whatever the throttle says, unless RC_CLIMB_BY_THROTTLE is set.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._kept_height = self._kept_rate = 0.0
 
@@ -244,10 +244,10 @@ class HoldHeight(AltitudeHold):
         return 0.0
 
 
-class HoldPlace(ManualFlight):
+class HoverHold(ManualFlight):
     """HOVER_Z_HOLD: hold the position; the sticks command the yaw rate only."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._place: Vector = (0.0, 0.0, 0.0)
 
@@ -289,13 +289,13 @@ class GuidedSetpoint:
     yaw_is_rate: bool = False
 
 
-class Guided(Guidance):
+class GuidedMode(Guidance):
     """GUIDED: hold the last set-point; at first position and heading where the mode was chosen.
 
     The original's guidance runs with motors off, too: starting them changes neither set-point nor reference.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         estimate = vehicle.estimate
         self._hold(GuidedSetpoint(*estimate.position, estimate.attitude[2]))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector, ned_to_enu, wrap
 from volery.base.time import Ns, to_seconds
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 if TYPE_CHECKING:
     pass
@@ -31,7 +31,7 @@ def never(_navigation: Navigation) -> bool:
     return False
 
 
-class Stage(Protocol):
+class PlanStage(Protocol):
     """One element of a block."""
 
     def run(self, nav: Navigation) -> bool:
@@ -62,7 +62,7 @@ class Once:
 
 
 @dataclass(frozen=True)
-class Idle:
+class MotorsIdle:
     """Level with closed throttle: running motors idle."""
 
     def run(self, nav: Navigation) -> bool:
@@ -106,7 +106,7 @@ class Go:
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircleWaypoint:
     """Circle a waypoint with the radius of a parameter; clockwise if positive."""
 
     waypoint: str
@@ -165,11 +165,11 @@ class Deroute:
 
 
 @dataclass(frozen=True)
-class Block:
+class PlanBlock:
     """Stages in order, and exceptions as pairs of condition and block."""
 
     name: str
-    stages: tuple[Stage, ...]
+    stages: tuple[PlanStage, ...]
     exceptions: tuple[tuple[Condition, str], ...] = ()
 
 
@@ -178,7 +178,7 @@ class FlightPlan:
     """Waypoints (numbered from 1 in order) and blocks."""
 
     waypoints: dict[str, Vector]
-    blocks: tuple[Block, ...]
+    blocks: tuple[PlanBlock, ...]
 
     def block_number(self, name: str) -> int:
         """Return the number of a block."""
@@ -205,7 +205,7 @@ class Vertical(Enum):
     """Closed throttle."""
 
 
-class Demand(NamedTuple):
+class PlanDemand(NamedTuple):
     """Demand of the flight plan: target, the waypoint behind it, and climb rate [m/s]."""
 
     horizontal: int
@@ -215,13 +215,13 @@ class Demand(NamedTuple):
     climb: float = 0.0
 
 
-CLOSED = Demand(ATTITUDE, Vertical.THROTTLE)
+CLOSED = PlanDemand(ATTITUDE, Vertical.THROTTLE)
 
 
 class Navigation:
     """One vehicle's flight plan and its progress."""
 
-    def __init__(self, vehicle: Vehicle, plan: FlightPlan) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, plan: FlightPlan) -> None:
         self.vehicle = vehicle
         self.plan = plan
         self.waypoints: list[Vector] = [(0.0, 0.0, 0.0), *plan.waypoints.values()]
@@ -329,10 +329,10 @@ class Navigation:
         """Demand a waypoint at its height, or over it a climb at the rate of a parameter."""
         goal = self.point(name)
         if climb is None:
-            self.demand = Demand(WAYPOINT, Vertical.ALTITUDE, goal, goal)
+            self.demand = PlanDemand(WAYPOINT, Vertical.ALTITUDE, goal, goal)
         else:
             speed = self.vehicle.parameters[climb]
-            self.demand = Demand(WAYPOINT, Vertical.CLIMB, goal, goal, speed)
+            self.demand = PlanDemand(WAYPOINT, Vertical.CLIMB, goal, goal, speed)
 
     def fly_home(self) -> None:
         """Demand the waypoint HOME."""
@@ -344,7 +344,7 @@ class Navigation:
 
     def fly_route(self, start: Vector, end: Vector) -> None:
         """Demand a line: a target point ahead on it."""
-        self.demand = Demand(ROUTE, Vertical.ALTITUDE, self._on_line(start, end), end)
+        self.demand = PlanDemand(ROUTE, Vertical.ALTITUDE, self._on_line(start, end), end)
 
     def _on_line(self, start: Vector, end: Vector) -> Vector:
         east, north = end[0] - start[0], end[1] - start[1]
@@ -362,7 +362,7 @@ class Navigation:
         ahead = min(pi / 4.0, max(pi / 16.0, CARROT_M / size))
         angle = atan2(here[1] - centre[1], here[0] - centre[0]) - (ahead if radius > 0.0 else -ahead)
         target = centre[0] + size * cos(angle), centre[1] + size * sin(angle), centre[2]
-        self.demand = Demand(CIRCLE, Vertical.ALTITUDE, target, centre)
+        self.demand = PlanDemand(CIRCLE, Vertical.ALTITUDE, target, centre)
 
     def fly_oval(self, first: Vector, second: Vector, radius: float) -> None:
         """Demand an oval: leg left of the line, half circle, other leg, half circle."""

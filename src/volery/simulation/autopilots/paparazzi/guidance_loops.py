@@ -213,7 +213,7 @@ class PlaneLoop:
         return cos(self.leans[0].estimate) * cos(self.leans[1].estimate)
 
 
-class Limits(NamedTuple):
+class SpeedLimits(NamedTuple):
     """Greatest speeds of the references in the plane, up and down [m/s]."""
 
     level: float
@@ -269,7 +269,9 @@ class HeightLoop:
         self.height += self.climb * SUBSTEP
         return thrust
 
-    def rest(self, before: HeightLoop, goal: float, limits: Limits, steps: int, *, by_climb: bool) -> None:
+    def rest(
+        self, before: HeightLoop, goal: float, limits: SpeedLimits, steps: int, *, by_climb: bool
+    ) -> None:
         """Take over the reference of *before*, and move it alone: it does not stop with the motors.
 
         Args:
@@ -318,7 +320,7 @@ class GuidanceLoops:
         self,
         plane: tuple[float, float],
         up: float,
-        limits: Limits,
+        limits: SpeedLimits,
         *,
         plane_is_velocity: bool,
         up_is_velocity: bool,

@@ -14,11 +14,16 @@ from math import isfinite, radians
 from typing import NamedTuple
 
 from volery.links.paparazzi_aircraft import stock_aircraft
-from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
+from volery.simulation.autopilots.autopilot_parameters import (
+    REAL32,
+    ManoeuvreTuning,
+    StoredParameter,
+    VehicleParameters,
+)
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 from volery.simulation.autopilots.paparazzi.modes import set_mode_by_datalink, set_motors
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 MANUAL_SWITCH, AUTO1_SWITCH, AUTO2_SWITCH = "MODE_MANUAL", "MODE_AUTO1", "MODE_AUTO2"
 """Parameters that define the positions of a transmitter's mode switch."""
@@ -29,53 +34,57 @@ FARTHEST_M = stock_aircraft().farthest or 150.0
 SLOWEST = 0.1
 
 
-class Figure(NamedTuple):
+class AirframeFigure(NamedTuple):
     """Value and meaning of a figure of the airframe."""
 
     value: float
     what: str
 
 
-FIGURES: Mapping[str, Figure] = {
-    "MODE_STARTUP": Figure(13.0, "mode after switching on: NAV"),
-    MANUAL_SWITCH: Figure(4.0, "mode at the transmitter's MANUAL: ATTITUDE_DIRECT"),
-    AUTO1_SWITCH: Figure(9.0, "mode at AUTO1: ATTITUDE_Z_HOLD"),
-    AUTO2_SWITCH: Figure(13.0, "mode at AUTO2, the setting `auto2`: NAV"),
-    "MAX_DIST_FROM_HOME": Figure(FARTHEST_M, "m from HOME at which NAV becomes HOME"),
-    "FAILSAFE_MODE_DISTANCE": Figure(
+FIGURES: Mapping[str, AirframeFigure] = {
+    "MODE_STARTUP": AirframeFigure(13.0, "mode after switching on: NAV"),
+    MANUAL_SWITCH: AirframeFigure(4.0, "mode at the transmitter's MANUAL: ATTITUDE_DIRECT"),
+    AUTO1_SWITCH: AirframeFigure(9.0, "mode at AUTO1: ATTITUDE_Z_HOLD"),
+    AUTO2_SWITCH: AirframeFigure(13.0, "mode at AUTO2, the setting `auto2`: NAV"),
+    "MAX_DIST_FROM_HOME": AirframeFigure(FARTHEST_M, "m from HOME at which NAV becomes HOME"),
+    "FAILSAFE_MODE_DISTANCE": AirframeFigure(
         1.2 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
     ),
-    "FAILSAFE_DESCENT_SPEED": Figure(0.0, "m/s down in FAILSAFE: v6.2 keeps its height; 1.5 is intended"),
-    "RC_CLIMB_BY_THROTTLE": Figure(
+    "FAILSAFE_DESCENT_SPEED": AirframeFigure(
+        0.0, "m/s down in FAILSAFE: v6.2 keeps its height; 1.5 is intended"
+    ),
+    "RC_CLIMB_BY_THROTTLE": AirframeFigure(
         0.0, "1: the throttle climbs in ATTITUDE_RC_CLIMB as intended; v6.2 does not follow it"
     ),
-    "FAILSAFE_ON_BAT_CRITICAL": Figure(0.0, "1: a critical battery is FAILSAFE, and keeps motors off"),
-    "CRITIC_BAT_LEVEL": Figure(0.0, "V that are critical; 3.1 V a cell of its battery"),
-    "GEOFENCE_DATALINK_LOST_TIME": Figure(0.0, "s of silence after which NAV becomes HOME; 0: never"),
-    "GEOFENCE_MAX_ALTITUDE": Figure(0.0, "m above the origin at which NAV becomes HOME; 0: none"),
-    "GPS_TIMEOUT": Figure(0.3, "s without a fix after which satellites are lost"),
-    "RC_LOST_TIME": Figure(0.5, "s without sticks: LOST"),
-    "RC_REALLY_LOST_TIME": Figure(1.0, "s without sticks: REALLY_LOST, in modes of sticks FAILSAFE"),
-    "GUIDANCE_H_REF_MAX_SPEED": Figure(5.0, "m/s in the plane"),
-    "GUIDANCE_H_REF_MAX_ACCEL": Figure(2.5, "m/s^2 in the plane"),
-    "GUIDANCE_V_REF_MAX_CLIMB": Figure(3.0, "m/s up"),
-    "GUIDANCE_V_REF_MAX_DESCENT": Figure(3.0, "m/s down"),
-    "GUIDANCE_V_REF_MAX_ACCEL": Figure(1.0, "m/s^2 up and down"),
-    "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(45.0, "degrees of lean"),
-    "STABILIZATION_ATTITUDE_SP_MAX_R": Figure(90.0, "degrees/s of turn by stick"),
-    "ARRIVED_AT_WAYPOINT": Figure(3.0, "m from a waypoint at which the plan goes on"),
-    "NAV_CLIMB_VSPEED": Figure(0.5, "m/s up in block Takeoff"),
-    "NAV_DESCEND_VSPEED": Figure(-0.8, "m/s up in block flare"),
-    "DEFAULT_CIRCLE_RADIUS": Figure(5.0, "m; clockwise if positive"),
+    "FAILSAFE_ON_BAT_CRITICAL": AirframeFigure(
+        0.0, "1: a critical battery is FAILSAFE, and keeps motors off"
+    ),
+    "CRITIC_BAT_LEVEL": AirframeFigure(0.0, "V that are critical; 3.1 V a cell of its battery"),
+    "GEOFENCE_DATALINK_LOST_TIME": AirframeFigure(0.0, "s of silence after which NAV becomes HOME; 0: never"),
+    "GEOFENCE_MAX_ALTITUDE": AirframeFigure(0.0, "m above the origin at which NAV becomes HOME; 0: none"),
+    "GPS_TIMEOUT": AirframeFigure(0.3, "s without a fix after which satellites are lost"),
+    "RC_LOST_TIME": AirframeFigure(0.5, "s without sticks: LOST"),
+    "RC_REALLY_LOST_TIME": AirframeFigure(1.0, "s without sticks: REALLY_LOST, in modes of sticks FAILSAFE"),
+    "GUIDANCE_H_REF_MAX_SPEED": AirframeFigure(5.0, "m/s in the plane"),
+    "GUIDANCE_H_REF_MAX_ACCEL": AirframeFigure(2.5, "m/s^2 in the plane"),
+    "GUIDANCE_V_REF_MAX_CLIMB": AirframeFigure(3.0, "m/s up"),
+    "GUIDANCE_V_REF_MAX_DESCENT": AirframeFigure(3.0, "m/s down"),
+    "GUIDANCE_V_REF_MAX_ACCEL": AirframeFigure(1.0, "m/s^2 up and down"),
+    "STABILIZATION_ATTITUDE_SP_MAX_PHI": AirframeFigure(45.0, "degrees of lean"),
+    "STABILIZATION_ATTITUDE_SP_MAX_R": AirframeFigure(90.0, "degrees/s of turn by stick"),
+    "ARRIVED_AT_WAYPOINT": AirframeFigure(3.0, "m from a waypoint at which the plan goes on"),
+    "NAV_CLIMB_VSPEED": AirframeFigure(0.5, "m/s up in block Takeoff"),
+    "NAV_DESCEND_VSPEED": AirframeFigure(-0.8, "m/s up in block flare"),
+    "DEFAULT_CIRCLE_RADIUS": AirframeFigure(5.0, "m; clockwise if positive"),
 }
 """Figures by name. A model's ``parameters`` of a vehicle replace their values."""
 
 _FULL = ChannelRange(1000.0, 1500.0, 2000.0, 0.0)
 
 
-def default_parameters() -> tuple[Parameter, ...]:
+def default_parameters() -> tuple[StoredParameter, ...]:
     """Return the default parameters."""
-    return tuple(Parameter(name, REAL32, figure.value) for name, figure in FIGURES.items())
+    return tuple(StoredParameter(name, REAL32, figure.value) for name, figure in FIGURES.items())
 
 
 def own_parameters(_system: int, flight: Flight) -> dict[str, float]:
@@ -83,12 +92,12 @@ def own_parameters(_system: int, flight: Flight) -> dict[str, float]:
     return {"CRITIC_BAT_LEVEL": CRITICAL_CELL_VOLTS * flight.spec.battery.cells}
 
 
-def tuning(parameters: Parameters) -> Tuning:
+def tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning that follows from the parameters."""
     p = parameters
     up, down = _moving(p["GUIDANCE_V_REF_MAX_CLIMB"]), _moving(p["GUIDANCE_V_REF_MAX_DESCENT"])
     accel_z = _moving(p["GUIDANCE_V_REF_MAX_ACCEL"])
-    return Tuning(
+    return ManoeuvreTuning(
         sticks=StickMap(travels=(_FULL, _FULL, _FULL, _FULL)),
         speed=_moving(p["GUIDANCE_H_REF_MAX_SPEED"]),
         speed_up=up,
@@ -112,31 +121,31 @@ def _moving(value: float) -> float:
 class Variable(NamedTuple):
     """Access to one setting."""
 
-    read: Callable[[Vehicle], float]
-    write: Callable[[Vehicle, float], None]
+    read: Callable[[AutopilotVehicle], float]
+    write: Callable[[AutopilotVehicle, float], None]
 
 
 def _parameter(name: str) -> Variable:
-    def write(vehicle: Vehicle, value: float) -> None:
+    def write(vehicle: AutopilotVehicle, value: float) -> None:
         vehicle.set_parameter(name, value)
 
     return Variable(lambda vehicle: vehicle.parameters[name], write)
 
 
-def _set_telemetry_mode(vehicle: Vehicle, value: float) -> None:
+def _set_telemetry_mode(vehicle: AutopilotVehicle, value: float) -> None:
     vehicle.firmware_state.telemetry_mode = int(value)
 
 
 def _stored(number: int) -> Variable:
     """Return what answers for a number without a setting: it is stored, as observed."""
 
-    def write(vehicle: Vehicle, value: float) -> None:
+    def write(vehicle: AutopilotVehicle, value: float) -> None:
         vehicle.firmware_state.stored_settings[number] = value
 
     return Variable(lambda vehicle: vehicle.firmware_state.stored_settings.get(number, 0.0), write)
 
 
-def _keep(_vehicle: Vehicle, _value: float) -> None:
+def _keep(_vehicle: AutopilotVehicle, _value: float) -> None:
     """Leave a setting as it is."""
 
 
@@ -158,15 +167,17 @@ VARIABLES = {
 }
 """Settings by the variables of the stock rotorcraft."""
 
-NUMBERED = {one.number: VARIABLES.get(one.variable, WITHOUT_MODEL) for one in stock_aircraft().settings}
+NUMBERED = {
+    setting.number: VARIABLES.get(setting.variable, WITHOUT_MODEL) for setting in stock_aircraft().settings
+}
 
 
-def read_setting(vehicle: Vehicle, number: int) -> float:
+def read_setting(vehicle: AutopilotVehicle, number: int) -> float:
     """Return the value of a setting; a number without a setting answers as well, at first with 0."""
     return NUMBERED.get(number, _stored(number)).read(vehicle)
 
 
-def write_setting(vehicle: Vehicle, number: int, value: float) -> float:
+def write_setting(vehicle: AutopilotVehicle, number: int, value: float) -> float:
     """Write a setting, and return its new value; a number without a setting answers what was written."""
     variable = NUMBERED.get(number, _stored(number))
     if isfinite(value):

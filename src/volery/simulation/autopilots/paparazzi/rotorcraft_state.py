@@ -14,7 +14,7 @@ from volery.base.frames import Vector
 from volery.base.time import MS, Ns
 from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 RADIO_OK, RADIO_LOST, RADIO_REALLY_LOST = 0, 1, 2
 FULL = 9600
@@ -45,14 +45,14 @@ class RadioControl:
         self.frame = StickFrame(throttle=0)
         self._last_frame_ns: Ns = NEVER
 
-    def status(self, vehicle: Vehicle) -> int:
+    def status(self, vehicle: AutopilotVehicle) -> int:
         """Return RADIO_OK, RADIO_LOST or RADIO_REALLY_LOST."""
         silence = vehicle.kernel.now() - self._last_frame_ns
         if silence < vehicle.seconds_parameter("RC_LOST_TIME"):
             return RADIO_OK
         return RADIO_LOST if silence < vehicle.seconds_parameter("RC_REALLY_LOST_TIME") else RADIO_REALLY_LOST
 
-    def receive(self, vehicle: Vehicle, frame: StickFrame) -> None:
+    def receive(self, vehicle: AutopilotVehicle, frame: StickFrame) -> None:
         """Store a frame and write it to the RC channels."""
         now = vehicle.kernel.now()
         self._last_frame_ns, self.frame = now, frame
@@ -69,7 +69,7 @@ class RadioControl:
 
 @dataclass
 class RotorcraftState:
-    """State that only this firmware keeps about a vehicle (``Vehicle.firmware_state``)."""
+    """State that only this firmware keeps about a vehicle (``AutopilotVehicle.firmware_state``)."""
 
     navigation: Navigation
     radio: RadioControl = field(default_factory=RadioControl)
@@ -96,7 +96,7 @@ class RotorcraftState:
     """Number of touch-downs before the one that block ``flare`` awaits, while it does."""
 
 
-def state_of(vehicle: Vehicle) -> RotorcraftState:
+def state_of(vehicle: AutopilotVehicle) -> RotorcraftState:
     """Return the rotorcraft state of a vehicle."""
     state = vehicle.firmware_state
     assert isinstance(state, RotorcraftState)
@@ -108,19 +108,19 @@ ACQUIRED_AFTER = 300 * MS
 """Uptime of the first fix."""
 
 
-def fix_type(vehicle: Vehicle) -> int:
+def fix_type(vehicle: AutopilotVehicle) -> int:
     """Return the fix type of GPS_INT: 0 none, 3 3D, 4 differential, 5 RTK (MAVLink has two RTK types)."""
     if vehicle.uptime() < ACQUIRED_AFTER:
         return 0
     return min(5, vehicle.estimate.fix_type)
 
 
-def fix_is_valid(vehicle: Vehicle) -> bool:
+def fix_is_valid(vehicle: AutopilotVehicle) -> bool:
     """Return whether there is a 3D fix."""
     return fix_type(vehicle) >= FIX_3D
 
 
-def update_fix(vehicle: Vehicle) -> None:
+def update_fix(vehicle: AutopilotVehicle) -> None:
     """Store the time of a valid fix. The first fix sets the estimator's origin."""
     if fix_is_valid(vehicle):
         state_of(vehicle).last_fix_ns = vehicle.kernel.now()
@@ -131,7 +131,7 @@ def update_fix(vehicle: Vehicle) -> None:
         state_of(vehicle).frozen = vehicle.estimate.position, vehicle.estimate.velocity
 
 
-def known_motion(vehicle: Vehicle) -> tuple[Vector, Vector]:
+def known_motion(vehicle: AutopilotVehicle) -> tuple[Vector, Vector]:
     """Return position and velocity as the firmware has them: in the plane they keep those of the last fix."""
     estimate, frozen = vehicle.estimate, state_of(vehicle).frozen
     if frozen is None:
@@ -140,6 +140,6 @@ def known_motion(vehicle: Vehicle) -> tuple[Vector, Vector]:
     return (north, east, estimate.position[2]), (vn, ve, estimate.velocity[2])
 
 
-def gps_lost(vehicle: Vehicle) -> bool:
+def gps_lost(vehicle: AutopilotVehicle) -> bool:
     """Return whether there was no fix for GPS_TIMEOUT."""
     return vehicle.kernel.now() - state_of(vehicle).last_fix_ns > vehicle.seconds_parameter("GPS_TIMEOUT")

@@ -15,12 +15,12 @@ from volery.base.frames import Vector, enu_to_ned, euler_to_quaternion, geodetic
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi import modes, rotorcraft_state
-from volery.simulation.autopilots.paparazzi.flight_modes import Guided
+from volery.simulation.autopilots.paparazzi.flight_modes import GuidedMode
 from volery.simulation.autopilots.paparazzi.flight_plan import Vertical
 from volery.simulation.autopilots.paparazzi.parameters import NUMBERED, read_setting
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import FULL, state_of
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 Fields = dict[str, Any]
 
@@ -66,7 +66,7 @@ def counted(value: float, bits: int = 16) -> int:
     return int(value) % (1 << bits)
 
 
-def rotorcraft_fp(vehicle: Vehicle) -> Fields:
+def rotorcraft_fp(vehicle: AutopilotVehicle) -> Fields:
     """Return ROTORCRAFT_FP: estimated state and target."""
     estimate, (position, velocity) = vehicle.estimate, rotorcraft_state.known_motion(vehicle)
     fields: Fields = {}
@@ -86,10 +86,10 @@ def rotorcraft_fp(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def _carrot(vehicle: Vehicle) -> tuple[Vector, float]:
+def _carrot(vehicle: AutopilotVehicle) -> tuple[Vector, float]:
     """Return the target point, north-east-down [m], and the heading [rad]."""
     manoeuvre, navigation = vehicle.manoeuvre, state_of(vehicle).navigation
-    if isinstance(manoeuvre, Guided):
+    if isinstance(manoeuvre, GuidedMode):
         return manoeuvre.carrot()
     demand = navigation.demand
     if demand.vertical is Vertical.THROTTLE:
@@ -102,7 +102,7 @@ def _centimetres(name: str, vector: Vector, fields: Fields) -> None:
         fields[name.format(axis)] = to_counts(value, 100.0)
 
 
-def gps_int(vehicle: Vehicle) -> Fields:
+def gps_int(vehicle: AutopilotVehicle) -> Fields:
     """Return GPS_INT: the last fix of the receiver."""
     fix = vehicle.estimate.gps
     kind = rotorcraft_state.fix_type(vehicle)
@@ -138,7 +138,7 @@ def _to_ecef(ned: Vector, latitude: float, longitude: float) -> Vector:
     )
 
 
-def ins_ref(vehicle: Vehicle) -> Fields | None:
+def ins_ref(vehicle: AutopilotVehicle) -> Fields | None:
     """Return INS_REF once there is a local origin."""
     if not vehicle.estimate.position_ok or vehicle.home is None:
         return None
@@ -154,7 +154,7 @@ def ins_ref(vehicle: Vehicle) -> Fields | None:
     return fields
 
 
-def rotorcraft_status(vehicle: Vehicle) -> Fields:
+def rotorcraft_status(vehicle: AutopilotVehicle) -> Fields:
     """Return ROTORCRAFT_STATUS."""
     plane, height = GUIDANCE[vehicle.mode.number]
     return {
@@ -173,7 +173,7 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def nav_status(vehicle: Vehicle) -> Fields:
+def nav_status(vehicle: AutopilotVehicle) -> Fields:
     """Return ROTORCRAFT_NAV_STATUS: progress of the flight plan."""
     navigation = state_of(vehicle).navigation
     return {
@@ -187,12 +187,12 @@ def nav_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def alive(_vehicle: Vehicle) -> Fields:
+def alive(_vehicle: AutopilotVehicle) -> Fields:
     """Return ALIVE."""
     return {"md5sum": stock_aircraft().fingerprint}
 
 
-def energy(vehicle: Vehicle) -> Fields:
+def energy(vehicle: AutopilotVehicle) -> Fields:
     """Return ENERGY."""
     estimate = vehicle.estimate
     power = estimate.battery_volts * estimate.battery_amps
@@ -208,7 +208,7 @@ def energy(vehicle: Vehicle) -> Fields:
     }
 
 
-def datalink_report(vehicle: Vehicle) -> Fields:
+def datalink_report(vehicle: AutopilotVehicle) -> Fields:
     """Return DATALINK_REPORT."""
     state = state_of(vehicle)
     received = state.last_uplink_ns != NEVER
@@ -220,7 +220,7 @@ def datalink_report(vehicle: Vehicle) -> Fields:
     }
 
 
-def waypoint(vehicle: Vehicle, number: int) -> Fields:
+def waypoint(vehicle: AutopilotVehicle, number: int) -> Fields:
     """Return WP_MOVED_ENU of that waypoint."""
     east, north, up = state_of(vehicle).navigation.waypoints[number]
     return {
@@ -231,14 +231,14 @@ def waypoint(vehicle: Vehicle, number: int) -> Fields:
     }
 
 
-def next_waypoint(vehicle: Vehicle) -> Fields:
+def next_waypoint(vehicle: AutopilotVehicle) -> Fields:
     """Return WP_MOVED_ENU of the waypoints in turn."""
     state = state_of(vehicle)
     state.last_sent_waypoint = (state.last_sent_waypoint + 1) % len(state.navigation.waypoints)
     return waypoint(vehicle, state.last_sent_waypoint)
 
 
-def ins(vehicle: Vehicle) -> Fields:
+def ins(vehicle: AutopilotVehicle) -> Fields:
     """Return INS: estimated position, velocity and acceleration, north, east, down."""
     estimate, (position, velocity) = vehicle.estimate, rotorcraft_state.known_motion(vehicle)
     fields: Fields = {}
@@ -252,7 +252,7 @@ def ins(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def ahrs_ref_quat(vehicle: Vehicle) -> Fields:
+def ahrs_ref_quat(vehicle: AutopilotVehicle) -> Fields:
     """Return AHRS_REF_QUAT: commanded and estimated attitude."""
     estimate = vehicle.estimate
     wanted = euler_to_quaternion(*estimate.target_attitude) if vehicle.armed else (1.0, 0.0, 0.0, 0.0)
@@ -263,7 +263,7 @@ def ahrs_ref_quat(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def air_data(vehicle: Vehicle) -> Fields:
+def air_data(vehicle: AutopilotVehicle) -> Fields:
     """Return AIR_DATA: pressure and the rest without a sensor, as recorded."""
     return {
         "pressure": vehicle.estimate.pressure * 100.0,
@@ -274,17 +274,17 @@ def air_data(vehicle: Vehicle) -> Fields:
     }
 
 
-def state_filter_status(_vehicle: Vehicle) -> Fields:
+def state_filter_status(_vehicle: AutopilotVehicle) -> Fields:
     """Return STATE_FILTER_STATUS as recorded: the attitude filter works."""
     return {"id": 3, "state_filter_mode": 3}
 
 
-def autopilot_version(_vehicle: Vehicle) -> Fields:
+def autopilot_version(_vehicle: AutopilotVehicle) -> Fields:
     """Return AUTOPILOT_VERSION: the version that is simulated."""
     return {"version": 60_200, "desc": "v6.2 simulated by volery"}
 
 
-def next_setting(vehicle: Vehicle) -> Fields:
+def next_setting(vehicle: AutopilotVehicle) -> Fields:
     """Return DL_VALUE of the settings in turn."""
     state = state_of(vehicle)
     state.last_sent_setting = (state.last_sent_setting + 1) % len(NUMBERED)
@@ -299,7 +299,7 @@ class PeriodicMessage(NamedTuple):
 
     name: str
     period: Ns
-    build: Callable[[Vehicle], Fields | None]
+    build: Callable[[AutopilotVehicle], Fields | None]
 
 
 def _period(seconds: float) -> Ns:
@@ -330,7 +330,7 @@ OTHER_MODES = range(1, 10)
 NOT_IN_OTHER_MODES = frozenset({"ROTORCRAFT_FP", "ROTORCRAFT_NAV_STATUS"})
 
 
-def is_listed(vehicle: Vehicle, message: str) -> bool:
+def is_listed(vehicle: AutopilotVehicle, message: str) -> bool:
     """Return whether a periodic message is in the list that ``telemetry_mode_Main`` selects."""
     mode = state_of(vehicle).telemetry_mode
     return mode == 0 or (mode in OTHER_MODES and message not in NOT_IN_OTHER_MODES)

@@ -17,15 +17,20 @@ from volery.base.frames import Vector
 from volery.base.time import MS, S
 from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.autopilot import Firmware
-from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
+from volery.simulation.autopilots.autopilot_parameters import (
+    REAL32,
+    ManoeuvreTuning,
+    StoredParameter,
+    VehicleParameters,
+)
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
+    DriveBySticks,
     DriveTo,
     FollowSpeed,
-    Manual,
     ReturnRover,
     Stand,
     rover_leg,
@@ -42,14 +47,19 @@ from volery.simulation.autopilots.px4.flight_modes import (
     Hold,
     Orbit,
     PositionControl,
-    Return,
-    TakeOff,
+    Px4Return,
+    Px4TakeOff,
 )
 from volery.simulation.autopilots.px4.follow_target import FollowTarget
 from volery.simulation.autopilots.px4.modes import commander_of
 from volery.simulation.autopilots.px4.offboard import Offboard, OffboardTarget, StreamTarget
-from volery.simulation.autopilots.px4.versions import Version
-from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
+from volery.simulation.autopilots.px4.versions import Px4Version
+from volery.simulation.autopilots.vehicle_state import (
+    ArmingTimes,
+    AutopilotVehicle,
+    FlightManoeuvre,
+    ParameterTable,
+)
 from volery.trace.events import CRITICAL, INFO
 
 _SHARED = {
@@ -154,11 +164,11 @@ def _moving(value: float) -> float:
     return min(FASTEST, max(SLOWEST, value))
 
 
-def copter_tuning(parameters: Parameters) -> Tuning:
+def copter_tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning of a multirotor."""
     p = parameters
     tilt = radians(min(80.0, max(5.0, p["MPC_TILTMAX_AIR"])))
-    return Tuning(
+    return ManoeuvreTuning(
         sticks=STICKS,
         speed=_moving(p["MPC_XY_VEL_MAX"]),
         speed_up=_moving(p["MPC_Z_VEL_MAX_UP"]),
@@ -177,11 +187,11 @@ def copter_tuning(parameters: Parameters) -> Tuning:
     )
 
 
-def rover_tuning(parameters: Parameters) -> Tuning:
+def rover_tuning(parameters: VehicleParameters) -> ManoeuvreTuning:
     """Return the tuning of a rover."""
     p = parameters
     speed = _moving(p["GND_SPEED_TRIM"])
-    return Tuning(
+    return ManoeuvreTuning(
         sticks=STICKS,
         speed=speed,
         accel=2.0,
@@ -190,7 +200,7 @@ def rover_tuning(parameters: Parameters) -> Tuning:
     )
 
 
-def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
+def report_return_stage(vehicle: AutopilotVehicle, stage: str, amsl: float, above: float) -> None:
     """Report a stage of AUTO.RTL as status text and event.
 
     Args:
@@ -225,7 +235,7 @@ def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float)
         log.send(event_interface.RETURN_LAND)
 
 
-def _report_short_return(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
+def _report_short_return(vehicle: AutopilotVehicle, stage: str, amsl: float, above: float) -> None:
     """Report how high a return begins, and that it lands: no other stages, as newer versions."""
     log = commander_of(vehicle).log
     if stage == "climb":
@@ -240,7 +250,7 @@ def _report_short_return(vehicle: Vehicle, stage: str, amsl: float, above: float
 QUADROTOR = constant("MAV_TYPE_QUADROTOR")
 
 
-def _take_off(vehicle: Vehicle) -> Manoeuvre:
+def _take_off(vehicle: AutopilotVehicle) -> FlightManoeuvre:
     """Create the take-off to the commanded altitude, or to MIS_TAKEOFF_ALT above the vehicle."""
     commander = commander_of(vehicle)
     here = vehicle.estimate.geodetic[2]
@@ -254,10 +264,10 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
     elif amsl < here:
         amsl = here
         vehicle.send_text(CRITICAL, "Already higher than takeoff altitude\t")
-    return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
+    return Px4TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
 
 
-def _orbit(vehicle: Vehicle) -> Manoeuvre:
+def _orbit(vehicle: AutopilotVehicle) -> FlightManoeuvre:
     centre, radius, speed = commander_of(vehicle).orbit or (vehicle.estimate.position, 5.0, 1.0)
     return Orbit(vehicle, centre, radius, speed)
 
@@ -276,23 +286,23 @@ COPTER_MODES = modes.mode_table(
         modes.MISSION: lambda vehicle: FlyMission(
             vehicle, mission.leg, mission.MISSION_RULES, lambda _vehicle: True
         ),
-        modes.RTL: lambda vehicle: Return(vehicle, report_return_stage),
+        modes.RTL: lambda vehicle: Px4Return(vehicle, report_return_stage),
         modes.LAND: Descent,
         modes.FOLLOW: FollowTarget,
-        modes.TERMINATION: Manoeuvre,
+        modes.TERMINATION: FlightManoeuvre,
     },
     flies=True,
 )
 
 
-def _on_step(vehicle: Vehicle) -> None:
+def _on_step(vehicle: AutopilotVehicle) -> None:
     on_step(vehicle)
     manoeuvre = vehicle.manoeuvre
-    if vehicle.armed and not vehicle.landed and isinstance(manoeuvre, TakeOff) and manoeuvre.arrived():
+    if vehicle.armed and not vehicle.landed and isinstance(manoeuvre, Px4TakeOff) and manoeuvre.arrived():
         _stay_here(vehicle)
 
 
-def _stay_here(vehicle: Vehicle) -> None:
+def _stay_here(vehicle: AutopilotVehicle) -> None:
     """End the take-off: hold the position at which the end was detected."""
     here = vehicle.estimate.position
     commander_of(vehicle).continue_with(modes.LOITER)
@@ -306,9 +316,9 @@ flight stack's detector. Logged of seven landings: 3.0 s."""
 
 
 def table_of(
-    version: Version,
-    defaults: Callable[[], tuple[Parameter, ...]],
-    tuning: Callable[[Parameters], Tuning],
+    version: Px4Version,
+    defaults: Callable[[], tuple[StoredParameter, ...]],
+    tuning: Callable[[VehicleParameters], ManoeuvreTuning],
     supported: Mapping[str, str],
 ) -> ParameterTable:
     """Return the parameters of one version: those that it has."""
@@ -317,7 +327,7 @@ def table_of(
     return ParameterTable(defaults, tuning, own_parameters, there, version.renamed)
 
 
-def copter(version: Version) -> Firmware:
+def copter(version: Px4Version) -> Firmware:
     """Return one version of the firmware for a multirotor."""
     return px4_firmware(
         kind="multirotor",
@@ -332,16 +342,16 @@ def copter(version: Version) -> Firmware:
 
 GROUND_ROVER = constant("MAV_TYPE_GROUND_ROVER")
 
-ASSUMED = (Parameter("GND_SPEED_MAX", REAL32, 10.0), Parameter("GND_SPEED_TRIM", REAL32, 3.0))
+ASSUMED = (StoredParameter("GND_SPEED_MAX", REAL32, 10.0), StoredParameter("GND_SPEED_TRIM", REAL32, 3.0))
 """Documented defaults of parameters that the recorded multirotor does not list."""
 
 
-class HoldRover(Manoeuvre):
+class HoldRover(FlightManoeuvre):
     """AUTO.LOITER: stand, or drive to a point."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._active: Manoeuvre = Stand(vehicle)
+        self._active: FlightManoeuvre = Stand(vehicle)
 
     def send_to(self, point: Vector) -> None:
         """Drive to a point and stand there."""
@@ -355,12 +365,12 @@ class HoldRover(Manoeuvre):
         self._active.step()
 
 
-class OffboardRover(Manoeuvre):
+class OffboardRover(FlightManoeuvre):
     """OFFBOARD: a point, or a speed over ground in a direction."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
-        self._active: Manoeuvre = Stand(vehicle)
+        self._active: FlightManoeuvre = Stand(vehicle)
 
     def enter(self) -> None:
         """Stand until a set-point arrives."""
@@ -403,7 +413,7 @@ def _course(north: float, east: float, otherwise: float) -> float:
     return atan2(east, north) if north or east else otherwise
 
 
-class StickDrive(Manual):
+class StickDrive(DriveBySticks):
     """MANUAL and POSCTL: sticks are steering and throttle; without them the rover brakes and stands."""
 
     def step(self) -> None:
@@ -415,7 +425,7 @@ class StickDrive(Manual):
             self.vehicle.drive(Setpoint(Control.DRIVE, speed=self.vehicle.tuning.speed, accel=accel))
 
 
-def on_reposition(vehicle: Vehicle, command: Command) -> int:
+def on_reposition(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_REPOSITION with its flag."""
     point = commands.commanded_point(vehicle, command)
     if point is None or not vehicle.has_position:
@@ -451,7 +461,7 @@ ROVER_MODES = modes.mode_table(
 )
 
 
-def rover_parameters(version: Version) -> tuple[Parameter, ...]:
+def rover_parameters(version: Px4Version) -> tuple[StoredParameter, ...]:
     """Return the multirotor's recorded parameters with a rover's MAV_TYPE and a rover's additions."""
     shared = (
         parameter._replace(value=float(GROUND_ROVER)) if parameter.name == "MAV_TYPE" else parameter
@@ -460,7 +470,7 @@ def rover_parameters(version: Version) -> tuple[Parameter, ...]:
     return (*shared, *ASSUMED)
 
 
-def rover(version: Version) -> Firmware:
+def rover(version: Px4Version) -> Firmware:
     """Return one version of the firmware for a rover."""
     return px4_firmware(
         kind="rover",

@@ -27,9 +27,9 @@ from volery.simulation.autopilots.mavlink.messages import (
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
 from volery.simulation.autopilots.px4 import event_interface, failsafes, modes, offboard
 from volery.simulation.autopilots.px4.flight_modes import Hold
-from volery.simulation.autopilots.px4.modes import FORCE, OFFBOARD_LOST, Commander, commander_of
+from volery.simulation.autopilots.px4.modes import FORCE, OFFBOARD_LOST, CommanderState, commander_of
 from volery.simulation.autopilots.px4.offboard import deflection, set_rc_channels
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL, INFO
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
@@ -67,7 +67,7 @@ def to_integer(value: float) -> int:
     return round(value) if isfinite(value) else -1
 
 
-def on_set_mode(vehicle: Vehicle, command: Command) -> int:
+def on_set_mode(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_MODE (main and sub-mode).
 
     A disarmed vehicle accepts everything; invalid modes have no effect.
@@ -95,13 +95,13 @@ def on_set_mode(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
+def set_mode(vehicle: AutopilotVehicle, _base_mode: int, number: int) -> int:
     """Handle SET_MODE."""
     main, sub = modes.main_and_sub(number)
     return commander_of(vehicle).request_mode(modes.custom_mode(main, sub))
 
 
-def on_arm(vehicle: Vehicle, command: Command) -> int:
+def on_arm(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle COMPONENT_ARM_DISARM."""
     if command.param1 == 1.0:
         return commander_of(vehicle).arm()
@@ -110,7 +110,7 @@ def on_arm(vehicle: Vehicle, command: Command) -> int:
     return UNSUPPORTED
 
 
-def on_takeoff(vehicle: Vehicle, command: Command) -> int:
+def on_takeoff(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle NAV_TAKEOFF (altitude AMSL). A disarmed vehicle accepts it and takes off when armed."""
     commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.TAKEOFF):
@@ -120,7 +120,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_land(vehicle: Vehicle, _command: Command) -> int:
+def on_land(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle NAV_LAND: land at the present position."""
     commander = commander_of(vehicle)
     if commander.request_mode(modes.LAND) != ACCEPTED:
@@ -130,7 +130,7 @@ def on_land(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
-def on_return(vehicle: Vehicle, _command: Command) -> int:
+def on_return(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle NAV_RETURN_TO_LAUNCH."""
     commander = commander_of(vehicle)
     if vehicle.armed and not commander.can_fly(modes.RTL):
@@ -141,7 +141,7 @@ def on_return(vehicle: Vehicle, _command: Command) -> int:
     return commander.request_mode(modes.RTL)
 
 
-def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
+def commanded_point(vehicle: AutopilotVehicle, command: Command) -> Vector | None:
     """Return the point of a command, with the vehicle's own values where it gives none; None if invalid.
 
     Only NaN stands for none: 0 and 0 are a place, as for the original (navigator_main.cpp).
@@ -157,7 +157,7 @@ def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
     return point if all_within(point, FARTHEST) else None
 
 
-def on_reposition(vehicle: Vehicle, command: Command) -> int:
+def on_reposition(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_REPOSITION.
 
     Without its flag the command is refused, and in AUTO.LOITER flown nevertheless, as recorded. Beyond the
@@ -191,7 +191,7 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
         holding.speed = speed
 
 
-def on_change_speed(vehicle: Vehicle, command: Command) -> int:
+def on_change_speed(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_CHANGE_SPEED: speed over ground; -1 returns to the usual one."""
     valid = command.param2 > 0.0 or command.param2 == USUAL_SPEED
     if to_integer(command.param1) not in SPEED_OVER_GROUND or not valid:
@@ -204,7 +204,7 @@ HIGHEST_HOME = 1e6
 """Largest altitude of home that is accepted [m]: heights above it fit into 32 bits as mm."""
 
 
-def on_set_home(vehicle: Vehicle, command: Command) -> int:
+def on_set_home(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_HOME."""
     if command.param1 == 1.0:
         if not vehicle.has_position:
@@ -218,7 +218,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_orbit(vehicle: Vehicle, command: Command) -> int:
+def on_orbit(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_ORBIT: radius and speed, about the given point or the present position."""
     commander = commander_of(vehicle)
     centre = commanded_point(vehicle, command)
@@ -231,7 +231,7 @@ def on_orbit(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
+def on_mission_start(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle MISSION_START: enter AUTO.MISSION and arm."""
     commander = commander_of(vehicle)
     if not commander.has_mission:
@@ -242,7 +242,7 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED if commander.arm(for_mission=True) == ACCEPTED else DENIED
 
 
-def on_terminate(vehicle: Vehicle, command: Command) -> int:
+def on_terminate(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_FLIGHTTERMINATION: stop the motors."""
     commander = commander_of(vehicle)
     asked = isfinite(command.param1) and command.param1 > 0.5
@@ -261,13 +261,13 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_get_home(vehicle: Vehicle, _command: Command) -> int:
+def on_get_home(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle GET_HOME_POSITION."""
     vehicle.output.after_reply(lambda: vehicle.output.send_message("HOME_POSITION"))
     return ACCEPTED
 
 
-def on_run_checks(vehicle: Vehicle, _command: Command) -> int:
+def on_run_checks(vehicle: AutopilotVehicle, _command: Command) -> int:
     """Handle RUN_PREARM_CHECKS: report the arming checks anew; refused while armed."""
     if vehicle.armed:
         return TEMPORARILY_REJECTED
@@ -296,7 +296,7 @@ def _calibrated(command: Command) -> tuple[str, bool] | None:
     return ("accel", False) if command.x in (1.0, 4.0) else None
 
 
-def on_calibration(vehicle: Vehicle, command: Command) -> int:
+def on_calibration(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle PREFLIGHT_CALIBRATION: a new one, or all zero, ends the one in hand.
 
     A vehicle that stands cannot turn to the sides that accelerometer and compass need: those fail.
@@ -332,17 +332,17 @@ def on_calibration(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_storage(_vehicle: Vehicle, command: Command) -> int:
+def on_storage(_vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle PREFLIGHT_STORAGE: parameters are always saved; they are not loaded or reset."""
     return ACCEPTED if to_integer(command.param1) == SAVE else DENIED
 
 
-def accept(_vehicle: Vehicle, _command: Command) -> int:
+def accept(_vehicle: AutopilotVehicle, _command: Command) -> int:
     """Accept REQUEST_PROTOCOL_VERSION as recorded; the message is not in our definitions."""
     return ACCEPTED
 
 
-def on_failure(vehicle: Vehicle, command: Command) -> int | None:
+def on_failure(vehicle: AutopilotVehicle, command: Command) -> int | None:
     """Handle INJECT_FAILURE: an empty battery; of motors only the reports, of which there are none.
 
     Nothing answers for other units, as in the original with its built-in quadrotor.
@@ -360,7 +360,7 @@ def on_failure(vehicle: Vehicle, command: Command) -> int | None:
     return ACCEPTED
 
 
-def on_region(vehicle: Vehicle, command: Command) -> int:
+def on_region(vehicle: AutopilotVehicle, command: Command) -> int:
     """Handle DO_SET_ROI and its two forms: without a gimbal the nose turns to the place."""
     given = command.number != ROI_NONE and (command.x or command.y)
     if command.number == ROI_LOCATION and not given:
@@ -369,7 +369,7 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_gripper(vehicle: Vehicle, command: Command) -> int | None:
+def on_gripper(vehicle: AutopilotVehicle, command: Command) -> int | None:
     """Handle DO_GRIPPER, which needs PD_GRIPPER_EN where there is one; without it nothing answers."""
     enabling = "PD_GRIPPER_EN"
     if enabling in vehicle.parameters and not vehicle.parameters[enabling]:
@@ -381,7 +381,7 @@ def on_gripper(vehicle: Vehicle, command: Command) -> int | None:
     return ACCEPTED
 
 
-def ignore(_vehicle: Vehicle, _command: Command) -> None:
+def ignore(_vehicle: AutopilotVehicle, _command: Command) -> None:
     """Leave a command without an answer: it is meant for a module that does not run."""
 
 
@@ -429,18 +429,18 @@ OVERRIDE_AUTOMATIC, OVERRIDE_OFFBOARD = 1, 2
 """Bits of COM_RC_OVERRIDE."""
 
 
-def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_heartbeat(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle HEARTBEAT of a ground station."""
     if fields["type"] == GROUND_STATION:
         commander_of(vehicle).station_seen = vehicle.kernel.now()
 
 
-def on_event_request(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_event_request(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle REQUEST_EVENT: send the events again that are still kept."""
     commander_of(vehicle).log.send_again(fields["first_sequence"], fields["last_sequence"])
 
 
-def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_manual_control(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle MANUAL_CONTROL."""
     given = deflection(fields)
     sources = commander_of(vehicle).version.joystick_sources
@@ -458,7 +458,7 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) ->
             vehicle.run_manoeuvre()
 
 
-def _override(commander: Commander) -> None:
+def _override(commander: CommanderState) -> None:
     """Let moved sticks take over an automatic mode in flight, as COM_RC_OVERRIDE allows."""
     vehicle = commander.vehicle
     options = round(vehicle.parameters["COM_RC_OVERRIDE"])
@@ -472,7 +472,7 @@ def _override(commander: Commander) -> None:
         commander.pilot_takes_over()
 
 
-def _take(vehicle: Vehicle, target: offboard.StreamTarget | None) -> None:
+def _take(vehicle: AutopilotVehicle, target: offboard.StreamTarget | None) -> None:
     if target is None:
         return
     commander = commander_of(vehicle)
@@ -485,33 +485,33 @@ def _take(vehicle: Vehicle, target: offboard.StreamTarget | None) -> None:
             vehicle.run_manoeuvre()
 
 
-def on_local_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_local_target(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED."""
     _take(vehicle, offboard.local_target(vehicle, fields, commander_of(vehicle).log))
 
 
-def on_global_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_global_target(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_GLOBAL_INT, which counts only while there is a position."""
     if vehicle.has_position:
         _take(vehicle, offboard.global_target(vehicle, fields, commander_of(vehicle).log))
 
 
-def on_attitude_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_attitude_target(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET."""
     _take(vehicle, offboard.attitude_target(fields))
 
 
-def on_pose(vehicle: Vehicle, fields: dict[str, Any], _sender: int, *, name: str) -> None:
+def on_pose(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int, *, name: str) -> None:
     """Handle VISION_POSITION_ESTIMATE and ODOMETRY."""
     commander_of(vehicle).vision.receive(name, fields)
 
 
-def on_origin(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_origin(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_GPS_GLOBAL_ORIGIN."""
     commander_of(vehicle).vision.set_origin(fields)
 
 
-def on_time(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_time(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle the answer to a TIMESYNC."""
     commander_of(vehicle).vision.note_time(fields)
 

@@ -14,63 +14,63 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from volery.simulation.autopilots.mavlink.messages import boot_ms
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 
-class Event(NamedTuple):
+class EventToSend(NamedTuple):
     """One event; ``levels`` holds internal and external severity."""
 
     id: int
     levels: int
 
 
-ARMED = Event(0x0190CAF3, 0x66)
-DISARMED = Event(0x01F46777, 0x66)
-DISARM_REFUSED = Event(0x017C97C5, 0x62)
-THROTTLE_HIGH = Event(0x011AB045, 0x62)
-TAKEOFF_DETECTED = Event(0x01414569, 0x66)
-LANDING_DETECTED = Event(0x019638AC, 0x66)
-LANDING_HERE = Event(0x0132B2DE, 0x66)
-RETURNING = Event(0x01352CE4, 0x66)
-RETURN_ACTIVATED = Event(0x0114827B, 0x66)
-RETURN_HOME = Event(0x01AA3FA9, 0x66)
-RETURN_CLIMB = Event(0x018C8C09, 0x66)
-RETURN_FLY = Event(0x01F62F50, 0x66)
-RETURN_DESCEND = Event(0x01B911E0, 0x66)
-RETURN_LAND = Event(0x0102D3AA, 0x66)
-MISSION_TAKEOFF = Event(0x01E7315E, 0x66)
-MISSION_TIMEOUT = Event(0x01820270, 0x33)
-MINIMUM_TAKEOFF = Event(0x01DBF722, 0x66)
-FAILSAFE = Event(0x01DEDBD0, 0x42)
-FAILSAFE_HOLD = Event(0x01D11DF6, 0x42)
-FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
-FENCE_DISTANCE = Event(0x0115F1B8, 0x42)
-REPOSITION_OUTSIDE = Event(0x01CDEBC4, 0x33)
-STICKS_LOST = Event(0x0155CD44, 0x62)
-STICKS_BACK = Event(0x010AE2BD, 0x66)
-PILOT_TOOK_OVER = Event(0x010EAC3F, 0x66)
-MODE_REFUSED = Event(0x01A04397, 0x62)
-FRAME_UNSUPPORTED = Event(0x01B04541, 0x33)
-SETPOINT_INVALID = Event(0x015637A5, 0x33)
+ARMED = EventToSend(0x0190CAF3, 0x66)
+DISARMED = EventToSend(0x01F46777, 0x66)
+DISARM_REFUSED = EventToSend(0x017C97C5, 0x62)
+THROTTLE_HIGH = EventToSend(0x011AB045, 0x62)
+TAKEOFF_DETECTED = EventToSend(0x01414569, 0x66)
+LANDING_DETECTED = EventToSend(0x019638AC, 0x66)
+LANDING_HERE = EventToSend(0x0132B2DE, 0x66)
+RETURNING = EventToSend(0x01352CE4, 0x66)
+RETURN_ACTIVATED = EventToSend(0x0114827B, 0x66)
+RETURN_HOME = EventToSend(0x01AA3FA9, 0x66)
+RETURN_CLIMB = EventToSend(0x018C8C09, 0x66)
+RETURN_FLY = EventToSend(0x01F62F50, 0x66)
+RETURN_DESCEND = EventToSend(0x01B911E0, 0x66)
+RETURN_LAND = EventToSend(0x0102D3AA, 0x66)
+MISSION_TAKEOFF = EventToSend(0x01E7315E, 0x66)
+MISSION_TIMEOUT = EventToSend(0x01820270, 0x33)
+MINIMUM_TAKEOFF = EventToSend(0x01DBF722, 0x66)
+FAILSAFE = EventToSend(0x01DEDBD0, 0x42)
+FAILSAFE_HOLD = EventToSend(0x01D11DF6, 0x42)
+FAILSAFE_AFTER_HOLD = EventToSend(0x0194CA8A, 0x42)
+FENCE_DISTANCE = EventToSend(0x0115F1B8, 0x42)
+REPOSITION_OUTSIDE = EventToSend(0x01CDEBC4, 0x33)
+STICKS_LOST = EventToSend(0x0155CD44, 0x62)
+STICKS_BACK = EventToSend(0x010AE2BD, 0x66)
+PILOT_TOOK_OVER = EventToSend(0x010EAC3F, 0x66)
+MODE_REFUSED = EventToSend(0x01A04397, 0x62)
+FRAME_UNSUPPORTED = EventToSend(0x01B04541, 0x33)
+SETPOINT_INVALID = EventToSend(0x015637A5, 0x33)
 
-CHECKS_SUMMARY = Event(0x01A893E0, 0x88)
-NO_ATTITUDE = Event(0x019F748F, 0x22)
-NO_LOCAL_POSITION = Event(0x01D31BB9, 0x33)
-NO_GLOBAL_POSITION = Event(0x0198C273, 0x33)
-NO_MISSION = Event(0x0105C2D9, 0x66)
-NO_OFFBOARD_SIGNAL = Event(0x012F1DC7, 0x33)
-NO_STICKS = Event(0x0106ED29, 0x44)
-MODE_NOT_ARMABLE = Event(0x011C8F61, 0x66)
-NO_HOME = Event(0x01013630, 0x66)
-ITEM_INVALID = Event(0x01FEB270, 0x33)
-MISSION_OUTSIDE = Event(0x012B352D, 0x63)
-MISSION_BEGINS = Event(0x01EE01B1, 0x66)
-MISSION_ENDED = Event(0x014762F6, 0x66)
-MISSION_ENDED_LANDED = Event(0x01771204, 0x66)
-ARMING_DENIED = Event(0x0102089D, 0x62)
-FENCE_HEIGHT = Event(0x018EFA75, 0x42)
-STILL_STARTING = Event(0x0167C97B, 0x66)
-SENSORS_SUMMARY = Event(0x011D3727, 0x88)
+CHECKS_SUMMARY = EventToSend(0x01A893E0, 0x88)
+NO_ATTITUDE = EventToSend(0x019F748F, 0x22)
+NO_LOCAL_POSITION = EventToSend(0x01D31BB9, 0x33)
+NO_GLOBAL_POSITION = EventToSend(0x0198C273, 0x33)
+NO_MISSION = EventToSend(0x0105C2D9, 0x66)
+NO_OFFBOARD_SIGNAL = EventToSend(0x012F1DC7, 0x33)
+NO_STICKS = EventToSend(0x0106ED29, 0x44)
+MODE_NOT_ARMABLE = EventToSend(0x011C8F61, 0x66)
+NO_HOME = EventToSend(0x01013630, 0x66)
+ITEM_INVALID = EventToSend(0x01FEB270, 0x33)
+MISSION_OUTSIDE = EventToSend(0x012B352D, 0x63)
+MISSION_BEGINS = EventToSend(0x01EE01B1, 0x66)
+MISSION_ENDED = EventToSend(0x014762F6, 0x66)
+MISSION_ENDED_LANDED = EventToSend(0x01771204, 0x66)
+ARMING_DENIED = EventToSend(0x0102089D, 0x62)
+FENCE_HEIGHT = EventToSend(0x018EFA75, 0x42)
+STILL_STARTING = EventToSend(0x0167C97B, 0x66)
+SENSORS_SUMMARY = EventToSend(0x011D3727, 0x88)
 
 BY_COMMAND, BY_MISSION, BY_LANDING, BY_WAITING = b"\x04", b"\x05", b"\x06", b"\x07"
 """Reasons of arming and disarming, as arguments."""
@@ -87,7 +87,7 @@ KEPT_EVENTS = 20
 """Number of events that a client may request again."""
 
 
-class EventLog:
+class EventBuffer:
     """Numbered events of one vehicle.
 
     Args:
@@ -95,13 +95,13 @@ class EventLog:
         replaced: What the version of the firmware sends instead of an event; ``None``: nothing.
     """
 
-    def __init__(self, vehicle: Vehicle, replaced: Mapping[Event, Event | None]) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, replaced: Mapping[EventToSend, EventToSend | None]) -> None:
         self._vehicle = vehicle
         self._replaced = replaced
         self.latest = FIRST_SEQUENCE
         self._kept: deque[dict[str, Any]] = deque(maxlen=KEPT_EVENTS)
 
-    def send(self, event: Event, arguments: bytes = b"") -> None:
+    def send(self, event: EventToSend, arguments: bytes = b"") -> None:
         """Send an event on all links, or what the version sends instead of it."""
         sent = self._replaced.get(event, event)
         if sent is None:
@@ -182,7 +182,7 @@ def _modes(checks: ArmingChecks) -> int:
 ALL_MODES = 0xFFFF_FFFF
 
 
-def arming_report(checks: ArmingChecks) -> list[tuple[Event, bytes]]:
+def arming_report(checks: ArmingChecks) -> list[tuple[EventToSend, bytes]]:
     """Return the events that report these checks."""
     able = _modes(checks)
     armable = 0 if checks.mission_required and not checks.mission else able

@@ -13,13 +13,13 @@ from typing import Any
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.external_aiding import (
     HORIZON,
+    AidingPose,
     ExternalAiding,
     Fusion,
-    Pose,
     place_origin,
     pose_of,
 )
-from volery.simulation.autopilots.vehicle_state import FIX_3D, Vehicle
+from volery.simulation.autopilots.vehicle_state import FIX_3D, AutopilotVehicle
 
 HORIZONTAL, VERTICAL, YAW = 1, 2, 8
 """Bits of EKF2_EV_CTRL."""
@@ -34,7 +34,7 @@ RESETS = 5
 LEAST_SIGMA = 0.01
 
 
-def uses_satellites(vehicle: Vehicle) -> bool:
+def uses_satellites(vehicle: AutopilotVehicle) -> bool:
     """Return whether the parameters let EKF2 take its horizontal position from satellites."""
     return bool(round(vehicle.parameters["EKF2_GPS_CTRL"]) & 1)
 
@@ -46,7 +46,7 @@ class ExternalVision:
         vehicle: The vehicle.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self.aiding = ExternalAiding()
         self._ahead: Ns | None = None
@@ -89,7 +89,7 @@ class ExternalVision:
         if aiding.used or aiding.interval < BEGINS_WITHIN:
             aiding.fuse(vehicle, pose, self._age(pose), self._fusion(pose, bits))
 
-    def _fusion(self, pose: Pose, bits: int) -> Fusion:
+    def _fusion(self, pose: AidingPose, bits: int) -> Fusion:
         vehicle, p = self._vehicle, self._vehicle.parameters
         stated = pose.variances if not p["EKF2_EV_NOISE_MD"] else (0.0,) * 3
         least = max(p["EKF2_EVP_NOISE"], LEAST_SIGMA)
@@ -105,7 +105,7 @@ class ExternalVision:
             resets=self.aiding.resets < RESETS or vehicle.landed,
         )
 
-    def _age(self, pose: Pose) -> Ns:
+    def _age(self, pose: AidingPose) -> Ns:
         """Return the age of a pose; 0 as long as the sender's clock is not known."""
         if self._ahead is None:
             return 0

@@ -24,17 +24,17 @@ from volery.simulation.autopilots.px4.modes import (
     OUTSIDE_FENCE,
     POSITION_LOST,
     STICKS_LOST,
-    Commander,
+    CommanderState,
     commander_of,
 )
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 from volery.trace.events import CRITICAL, INFO
 
 OUTSIDE = "Reposition is outside geofence\t"
 
 
-def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
+def fence_admits(vehicle: AutopilotVehicle, point: Vector) -> bool:
     """Return whether a reposition may go to that point, and report where it may not.
 
     A geofence that does not act (GF_ACTION 0), or only warns (1), admits every point.
@@ -50,7 +50,7 @@ def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
     return False
 
 
-def _report_breach(vehicle: Vehicle, beyond: str) -> None:
+def _report_breach(vehicle: AutopilotVehicle, beyond: str) -> None:
     """Say which limit of the geofence was reached."""
     farthest, highest, fence = commander_of(vehicle).version.fence_texts
     log = commander_of(vehicle).log
@@ -112,7 +112,7 @@ RECOVERY = 0.25
 """Hold time [s] that is regained for each second without a failsafe, as recorded."""
 
 
-def on_step(vehicle: Vehicle) -> None:
+def on_step(vehicle: AutopilotVehicle) -> None:
     """Run the commander for one tick."""
     commander = commander_of(vehicle)
     now = vehicle.kernel.now()
@@ -137,7 +137,7 @@ def on_step(vehicle: Vehicle) -> None:
 # -- manual control
 
 
-def _detect_stick_loss(commander: Commander, now: Ns) -> None:
+def _detect_stick_loss(commander: CommanderState, now: Ns) -> None:
     vehicle, sticks = commander.vehicle, commander.joystick
     patience = vehicle.seconds_parameter("COM_RC_LOSS_T") + LOSS_DETECTION_DELAY
     if sticks.valid and now - sticks.last_received_ns > patience:
@@ -149,7 +149,7 @@ def _detect_stick_loss(commander: Commander, now: Ns) -> None:
 # -- ground
 
 
-def _detect_ground(commander: Commander, now: Ns) -> None:
+def _detect_ground(commander: CommanderState, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies or (vehicle.armed and commander.terminated):
         return  # a terminated vehicle keeps its landed state
@@ -173,7 +173,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
     commander.flying = flying
 
 
-def _disarm_automatically(commander: Commander, now: Ns) -> None:
+def _disarm_automatically(commander: CommanderState, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies or not vehicle.landed:
         return
@@ -189,7 +189,7 @@ def _disarm_automatically(commander: Commander, now: Ns) -> None:
 # -- failsafes
 
 
-def _check_failsafes(commander: Commander, passed: float) -> None:
+def _check_failsafes(commander: CommanderState, passed: float) -> None:
     vehicle = commander.vehicle
     _update_hold_delay(commander, passed)
     if vehicle.flies and vehicle.landed:
@@ -204,7 +204,7 @@ def _check_failsafes(commander: Commander, passed: float) -> None:
     _check_link(commander)
 
 
-def _update_hold_delay(commander: Commander, passed: float) -> None:
+def _update_hold_delay(commander: CommanderState, passed: float) -> None:
     full = commander.vehicle.parameters["COM_FAIL_ACT_T"]
     if commander.hold_delay_left < 0.0 or commander.hold_delay_left > full:
         commander.hold_delay_left = full
@@ -214,12 +214,12 @@ def _update_hold_delay(commander: Commander, passed: float) -> None:
         commander.hold_delay_left = max(0.0, commander.hold_delay_left - passed)
 
 
-def _end_of_offboard_on_ground(commander: Commander) -> None:
+def _end_of_offboard_on_ground(commander: CommanderState) -> None:
     if commander.failsafe == OFFBOARD_LOST and commander.stream_alive():
         commander.resume_requested()
 
 
-def _forget_ended_cause(commander: Commander) -> None:
+def _forget_ended_cause(commander: CommanderState) -> None:
     """Let a failsafe that the user has ended act again once its cause has ended in between."""
     if not commander.taken_over:
         return
@@ -235,14 +235,14 @@ def _forget_ended_cause(commander: Commander) -> None:
         commander.taken_over = ""
 
 
-def _outranked(commander: Commander, name: str) -> bool:
+def _outranked(commander: CommanderState, name: str) -> bool:
     """Return whether a failsafe does not act: a higher one does, or the user has ended it."""
     if name == commander.taken_over:
         return True
     return OUTRANKS[commander.failsafe] >= OUTRANKS[name]
 
 
-def _end_hold(commander: Commander) -> None:
+def _end_hold(commander: CommanderState) -> None:
     """Execute the action of a failsafe after its hold."""
     if commander.hold_until == NEVER or commander.vehicle.kernel.now() < commander.hold_until:
         return
@@ -252,7 +252,7 @@ def _end_hold(commander: Commander) -> None:
     commander.begin_failsafe(commander.failsafe, commander.after_hold)
 
 
-def _hold_first(commander: Commander, name: str, number: int) -> None:
+def _hold_first(commander: CommanderState, name: str, number: int) -> None:
     """Hold for the rest of COM_FAIL_ACT_T, then enter mode ``number``."""
     vehicle, left = commander.vehicle, commander.hold_delay_left
     if commander.hold_until != NEVER:
@@ -270,7 +270,7 @@ def _hold_first(commander: Commander, name: str, number: int) -> None:
     commander.after_hold = number
 
 
-def _check_offboard(commander: Commander) -> None:
+def _check_offboard(commander: CommanderState) -> None:
     vehicle = commander.vehicle
     if commander.requested != modes.OFFBOARD:
         return
@@ -292,7 +292,7 @@ STICK_EXCEPTIONS = {modes.MISSION: 1, modes.LOITER: 2, modes.OFFBOARD: 4}
 """Bits of COM_RCL_EXCEPT."""
 
 
-def _check_sticks(commander: Commander) -> None:
+def _check_sticks(commander: CommanderState) -> None:
     vehicle, sticks = commander.vehicle, commander.joystick
     action = round(vehicle.parameters["NAV_RCL_ACT"])
     if (
@@ -308,7 +308,7 @@ def _check_sticks(commander: Commander) -> None:
     _act(commander, STICKS_LOST, action)
 
 
-def _check_link(commander: Commander) -> None:
+def _check_link(commander: CommanderState) -> None:
     vehicle = commander.vehicle
     action = round(vehicle.parameters["NAV_DLL_ACT"])
     if not action or commander.station_seen == NEVER:
@@ -322,12 +322,12 @@ def _check_link(commander: Commander) -> None:
         _act(commander, LINK_LOST, action)
 
 
-def _link_lost(commander: Commander) -> bool:
+def _link_lost(commander: CommanderState) -> bool:
     vehicle = commander.vehicle
     return vehicle.kernel.now() - commander.station_seen > vehicle.seconds_parameter("COM_DL_LOSS_T")
 
 
-def _check_geofence(commander: Commander) -> None:
+def _check_geofence(commander: CommanderState) -> None:
     """React to a vehicle outside of the geofence, as GF_ACTION states."""
     vehicle = commander.vehicle
     action = round(vehicle.parameters["GF_ACTION"])
@@ -344,7 +344,7 @@ def _check_geofence(commander: Commander) -> None:
         _act(commander, OUTSIDE_FENCE, FENCE_ACTIONS[action])
 
 
-def _act(commander: Commander, name: str, action: int) -> None:
+def _act(commander: CommanderState, name: str, action: int) -> None:
     if action in (TERMINATE, DISARM):
         commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
         if action == TERMINATE:
@@ -363,11 +363,11 @@ def _act(commander: Commander, name: str, action: int) -> None:
 LOW, CRITICALLY_LOW, EMERGENCY = "BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"
 
 
-def _battery_below(commander: Commander, level: str) -> bool:
+def _battery_below(commander: CommanderState, level: str) -> bool:
     return commander.vehicle.estimate.battery_left < commander.vehicle.parameters[level]
 
 
-def _check_battery(commander: Commander) -> None:
+def _check_battery(commander: CommanderState) -> None:
     vehicle, left = commander.vehicle, commander.vehicle.estimate.battery_left
     action, words = round(vehicle.parameters["COM_LOW_BAT_ACT"]), commander.version.battery_words
     if left < vehicle.parameters[EMERGENCY]:
@@ -382,7 +382,7 @@ def _check_battery(commander: Commander) -> None:
         _report_once(vehicle, *words[0])
 
 
-def _react_to_battery(commander: Commander, name: str, number: int) -> None:
+def _react_to_battery(commander: CommanderState, name: str, number: int) -> None:
     if commander.requested in (modes.LAND, number):
         return
     if not commander.can_fly(number):
@@ -390,13 +390,13 @@ def _react_to_battery(commander: Commander, name: str, number: int) -> None:
     _hold_first(commander, name, number)
 
 
-def _report_once(vehicle: Vehicle, severity: int, text: str) -> None:
+def _report_once(vehicle: AutopilotVehicle, severity: int, text: str) -> None:
     if text and text not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add(text)
         vehicle.send_text(severity, text)
 
 
-def _check_position(commander: Commander) -> None:
+def _check_position(commander: CommanderState) -> None:
     """React to a lost position: ALTCTL if the pilot flies, else a level descent."""
     vehicle = commander.vehicle
     flown = commander.failsafe_mode or commander.requested

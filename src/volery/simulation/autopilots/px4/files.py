@@ -11,7 +11,7 @@ from volery.base.time import S
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.file_service import Content, Encode, FilePolicy
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 SHELL, REPLY = 10, 1
 """SERIAL_CONTROL_DEV of the shell, SERIAL_CONTROL_FLAG of an answer."""
@@ -23,7 +23,7 @@ PROMPT = b"nsh> "
 _NO_SESSION, _SESSION_TAKEN, _UNKNOWN = 4, 5, 7
 
 
-def onboard_files(vehicle: Vehicle, encode: Encode) -> Mapping[str, Content]:
+def onboard_files(vehicle: AutopilotVehicle, encode: Encode) -> Mapping[str, Content]:
     """Return the logs, named by the date and the time at which each began."""
     files: dict[str, Content] = {}
     for log in vehicle.logs:
@@ -46,7 +46,7 @@ FILES = FilePolicy(
 )
 
 
-def on_shell(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+def on_shell(_vehicle: AutopilotVehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle SERIAL_CONTROL: the shell has no commands; other devices do not exist."""
     if fields["device"] != SHELL or fields["flags"] & REPLY:
         return

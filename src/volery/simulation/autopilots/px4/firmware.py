@@ -29,15 +29,15 @@ from volery.simulation.autopilots.px4 import files, geofence, mission, telemetry
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.external_vision import uses_satellites
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
-from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
-from volery.simulation.autopilots.px4.versions import Version
+from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, CommanderState, commander_of
+from volery.simulation.autopilots.px4.versions import Px4Version
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
+    AutopilotVehicle,
     Mode,
     ParameterTable,
     RcDefaults,
     StartupTimes,
-    Vehicle,
     VehicleAction,
     VehicleRules,
 )
@@ -62,24 +62,24 @@ FIRST_HEARTBEAT: Ns = 1_252 * MS
 """Recorded 1.19 to 1.34 s after boot."""
 
 
-def set_home_position(vehicle: Vehicle) -> None:
+def set_home_position(vehicle: AutopilotVehicle) -> None:
     """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
     if vehicle.estimate.position_ok and vehicle.home is None:
         vehicle.set_home_here()
 
 
-def stand_on_ground(vehicle: Vehicle) -> None:
+def stand_on_ground(vehicle: AutopilotVehicle) -> None:
     """Put the vehicle on the ground."""
     vehicle.ground.landed = True
 
 
-def find_position(vehicle: Vehicle) -> None:
+def find_position(vehicle: AutopilotVehicle) -> None:
     """Begin to take the position from satellites, unless the parameters forbid it."""
     if uses_satellites(vehicle):
         vehicle.flight.set_origin()
 
 
-def start_warm(vehicle: Vehicle) -> None:
+def start_warm(vehicle: AutopilotVehicle) -> None:
     """Put a vehicle that starts warm on the ground, without satellites if the parameters forbid them."""
     stand_on_ground(vehicle)
     if not uses_satellites(vehicle):
@@ -94,7 +94,7 @@ EVENTS = (
 )
 
 
-def on_position(vehicle: Vehicle) -> None:
+def on_position(vehicle: AutopilotVehicle) -> None:
     """Set the home position of a vehicle that starts warm, whose arming checks are not reported."""
     set_home_position(vehicle)
     commander_of(vehicle).reported = commander_of(vehicle).checks()
@@ -244,12 +244,12 @@ PARAMETERS = ParameterPolicy(
 """Recorded: 877 parameters in 0.85 s."""
 
 
-def _link_uses(version: Version) -> Mapping[str, Mapping[str, Ns]]:
+def _link_uses(version: Px4Version) -> Mapping[str, Mapping[str, Ns]]:
     """Return the streams of each use of a link."""
     return {use: {**rates, "MISSION_CURRENT": version.mission_period} for use, rates in USES.items()}
 
 
-def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Version) -> MavlinkFirmware:
+def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Px4Version) -> MavlinkFirmware:
     """Return the MAVLink rules of one version, for a kind of vehicle.
 
     Args:
@@ -314,9 +314,9 @@ def px4_firmware(
     kind: str,
     modes: Mapping[int, Mode],
     parameters: ParameterTable,
-    endpoint: Callable[[Vehicle], MavlinkEndpoint],
+    endpoint: Callable[[AutopilotVehicle], MavlinkEndpoint],
     on_step: VehicleAction,
-    version: Version,
+    version: Px4Version,
     arming: ArmingTimes = ROVER_ARMING,
 ) -> Firmware:
     """Return one version for one kind of vehicle: the shared rules, and the arguments."""
@@ -330,7 +330,7 @@ def px4_firmware(
             arming=arming,
             parameters=parameters,
             rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
-            firmware_state=partial(Commander, version=version),
+            firmware_state=partial(CommanderState, version=version),
             position_kept=POSITION_KEPT_S,
             pose_kept=POSE_KEPT_S,
         ),

@@ -14,12 +14,12 @@ from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight
-from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint, bearing
+from volery.simulation.autopilots.manoeuvres.to_point import DescendAndLand, ToPoint, bearing
 from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
 from volery.simulation.autopilots.px4.yaw_stick import YawStick
 from volery.simulation.autopilots.state_groups import NEVER, Home
-from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, AutopilotVehicle, FlightManoeuvre
 
 CLIMB_RAMP = ((0.0, 0.05), (0.6, 0.08), (0.75, 0.33), (1.5, 1.0))
 """Share of the climb rate over the time since lift-off in MPC_TKO_RAMP_T, as recorded."""
@@ -33,7 +33,7 @@ def interpolated(value: float, low: tuple[float, float], high: tuple[float, floa
     return low[1] + share * (high[1] - low[1])
 
 
-def climb_share(vehicle: Vehicle) -> float:
+def climb_share(vehicle: AutopilotVehicle) -> float:
     """Return the share of the climb rate that is allowed this long after lift-off."""
     lifted = vehicle.firmware_state.lifted_at
     if lifted == NEVER:
@@ -91,10 +91,10 @@ class Hold(ToPoint):
         return dist(here[:2], self.point[:2]) < sideways and abs(here[2] - self.point[2]) < height
 
 
-class TakeOff(Hold):
+class Px4TakeOff(Hold):
     """Climb vertically to an altitude at MPC_TKO_SPEED with its ramp."""
 
-    def __init__(self, vehicle: Vehicle, down: float) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, down: float) -> None:
         super().__init__(vehicle)
         self.taking_off = self.slow_start = True
         self.down = down
@@ -122,7 +122,7 @@ class TakeOff(Hold):
         return self.vehicle.estimate.position[2] - self.down < reach
 
 
-class Descent(Land):
+class Descent(DescendAndLand):
     """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, and at MPC_LAND_SPEED below ALT2."""
 
     def enter(self) -> None:
@@ -156,14 +156,16 @@ class Descent(Land):
         )
 
 
-class Return(Manoeuvre):
+class Px4Return(FlightManoeuvre):
     """AUTO.RTL: climb, fly home, descend to RTL_DESCEND_ALT, land. ``report`` is called at each stage."""
 
-    def __init__(self, vehicle: Vehicle, report: Callable[[Vehicle, str, float, float], None]) -> None:
+    def __init__(
+        self, vehicle: AutopilotVehicle, report: Callable[[AutopilotVehicle, str, float, float], None]
+    ) -> None:
         super().__init__(vehicle)
         self._report = report
         self._stage = ""
-        self._active: Manoeuvre = Hold(vehicle)
+        self._active: FlightManoeuvre = Hold(vehicle)
 
     def enter(self) -> None:
         """Climb vertically first."""
@@ -217,10 +219,10 @@ class Return(Manoeuvre):
         self._active.step()
 
 
-class Orbit(Manoeuvre):
+class Orbit(FlightManoeuvre):
     """Circle about a centre with the nose towards it."""
 
-    def __init__(self, vehicle: Vehicle, centre: Vector, radius: float, speed: float) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, centre: Vector, radius: float, speed: float) -> None:
         super().__init__(vehicle)
         self.centre, self.radius, self.speed = centre, radius, speed
         self.target = centre
@@ -276,7 +278,7 @@ def apply_expo(stick: float, dead: float) -> float:
 class AltitudeControl(AltitudeHold):
     """ALTCTL: as ``AltitudeHold``; throttle and yaw stick have a dead zone and an expo curve."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._turn = YawStick()
         self._turned_at: Ns = vehicle.kernel.now()
@@ -305,7 +307,7 @@ class AltitudeControl(AltitudeHold):
         return super().pilot._replace(yaw=self._turn.rate / self.vehicle.tuning.pilot_yaw_rate)
 
 
-def turn_by_stick(vehicle: Vehicle, turn: YawStick, stick: float, passed: float) -> float:
+def turn_by_stick(vehicle: AutopilotVehicle, turn: YawStick, stick: float, passed: float) -> float:
     """Advance a turn by a yaw stick -1..1 and return its rate [rad/s]; on the ground there is none."""
     if vehicle.landed:
         turn.reset()
@@ -314,10 +316,10 @@ def turn_by_stick(vehicle: Vehicle, turn: YawStick, stick: float, passed: float)
     return turn.step(wanted, passed)
 
 
-class BlindDescent(Manoeuvre):
+class BlindDescent(FlightManoeuvre):
     """POSCTL without manual control: hold the horizontal position and sink."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._held: Vector = (0.0, 0.0, 0.0)
 
@@ -345,7 +347,7 @@ class BlindDescent(Manoeuvre):
 class PositionControl(ManualFlight):
     """POSCTL: sticks command an acceleration against drag; centred sticks brake and hold."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self.slow_start = True
         self._velocity = (0.0, 0.0)

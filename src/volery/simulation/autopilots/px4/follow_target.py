@@ -15,7 +15,7 @@ from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import FARTHEST, all_within, finite
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
 from volery.simulation.autopilots.px4.flight_modes import Hold
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 HAS_POSITION = 1
 """Bit of ``est_capabilities``."""
@@ -30,7 +30,7 @@ class FollowTarget(Hold):
     The height is above home. The angle counts from the course of the target, from north until it has moved.
     """
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._course = 0.0
         self._followed: Vector | None = None
@@ -62,7 +62,7 @@ class FollowTarget(Hold):
         super().step()
 
 
-def on_follow_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+def on_follow_target(vehicle: AutopilotVehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle FOLLOW_TARGET, which counts while AUTO.FOLLOW_TARGET is flown."""
     following = vehicle.manoeuvre
     if not isinstance(following, FollowTarget) or not fields["est_capabilities"] & HAS_POSITION:

@@ -12,7 +12,7 @@ from math import dist
 from volery.base.frames import Vector
 from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION_UNSUPPORTED, RALLY
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 POLYGON_INSIDE, POLYGON_OUTSIDE, CIRCLE_INSIDE, CIRCLE_OUTSIDE, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
 """MAV_CMD of fence and rally points; the vehicle must stay inside or outside."""
@@ -21,7 +21,7 @@ BREACHED, TOO_FAR, TOO_HIGH = "fence", "distance", "height"
 """Limits that a point may be beyond."""
 
 
-def fence_breach(vehicle: Vehicle, point: Vector) -> str:
+def fence_breach(vehicle: AutopilotVehicle, point: Vector) -> str:
     """Return which limit of the geofence a point is beyond, or an empty text.
 
     Args:
@@ -44,7 +44,7 @@ def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
     return item if item.command in known.get(kind, ()) else MISSION_UNSUPPORTED
 
 
-def _within_points(vehicle: Vehicle, point: Vector) -> bool:
+def _within_points(vehicle: AutopilotVehicle, point: Vector) -> bool:
     """Return whether a point is in one area of the uploaded fence to stay in, and in none to avoid."""
     if not vehicle.points.get(FENCE):
         return True
@@ -61,7 +61,7 @@ def _within_points(vehicle: Vehicle, point: Vector) -> bool:
     return any(kept_in) or not kept_in
 
 
-def _areas(vehicle: Vehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
+def _areas(vehicle: AutopilotVehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
     """Yield command, corners or centre, and radius [m] of each area; corners follow each other."""
     items = vehicle.points.get(FENCE, [])
     place = 0
@@ -70,7 +70,8 @@ def _areas(vehicle: Vehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
         circle = item.command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE)
         count = 1 if circle else max(1, round(item.param1))
         corners = [
-            vehicle.point(one.frame, one.x / 1e7, one.y / 1e7, one.z) for one in items[place : place + count]
+            vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
+            for item in items[place : place + count]
         ]
         yield item.command, corners, item.param1
         place += count

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 WINDOW: Ns = 120 * S
 """Time after a take-off for which home is corrected."""
@@ -32,7 +32,7 @@ MOST_EPH, MOST_EPV, MOST_SPEED_ERROR = 5.0, 10.0, 1.0
 class HomeCorrection:
     """Corrects the home position of one vehicle; ``step`` is called at each tick."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self._baro = 0.0
         self._baro_at: Ns = NEVER

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from volery.simulation.world.state_layout import NED, Layout
+from volery.simulation.world.state_layout import NED, ColumnLayout
 
 SUBSTEP: Final = 0.02
 """Step of trajectory and loops [s]; PX4's flight tasks run at 50 Hz."""
@@ -22,7 +22,7 @@ DIRECT, TO_POINT, SINK, REST = 0.0, 1.0, 2.0, 3.0
 """Values of ``I_TASK``: set-points are controlled, the trajectory moves to a point, or down over it; only the
 estimate is advanced, of a vehicle at rest."""
 
-LOOP_LAYOUT = Layout()
+LOOP_LAYOUT = ColumnLayout()
 _add = LOOP_LAYOUT.add
 
 # --- inputs ---

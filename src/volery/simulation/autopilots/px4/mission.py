@@ -35,9 +35,9 @@ from volery.simulation.autopilots.onboard_mission import (
 )
 from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.commands import on_return
-from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
+from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, Px4TakeOff
 from volery.simulation.autopilots.px4.modes import commander_of
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 from volery.trace.events import CRITICAL, INFO
 
 UNSUPPORTED_FRAME = constant("MAV_MISSION_UNSUPPORTED_FRAME")
@@ -71,19 +71,19 @@ def stored_item(item: MissionItem) -> MissionItem | int:
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
 
 
-def report_refused_item(vehicle: Vehicle) -> None:
+def report_refused_item(vehicle: AutopilotVehicle) -> None:
     """Report that an uploaded item is refused."""
     vehicle.send_text(CRITICAL, "IGN MISSION_ITEM: Invalid item\t")
     commander_of(vehicle).log.send(event_interface.ITEM_INVALID)
 
 
-def give_up(vehicle: Vehicle) -> None:
+def give_up(vehicle: AutopilotVehicle) -> None:
     """Report that an upload has stopped; nothing is acknowledged."""
     vehicle.send_text(CRITICAL, "Operation timeout\t")
     commander_of(vehicle).log.send(event_interface.MISSION_TIMEOUT)
 
 
-def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
+def item_done(vehicle: AutopilotVehicle, index: int, _item: MissionItem) -> None:
     """Send MISSION_ITEM_REACHED with its repetitions, which the next item that is reached ends."""
     commander, began = commander_of(vehicle), vehicle.kernel.now()
     if commander.version.counts_actions:
@@ -100,7 +100,7 @@ def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
         vehicle.kernel.call_at(began + again * commander.version.mission_period, send)
 
 
-def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+def item_begins(vehicle: AutopilotVehicle, index: int, item: MissionItem) -> None:
     """Report that a mission begins, and the height of a take-off."""
     commander = commander_of(vehicle)
     commander.mission_finished, version = False, commander.version
@@ -114,13 +114,13 @@ def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
         commander_of(vehicle).log.send(event_interface.MISSION_TAKEOFF, event_interface.float_argument(above))
 
 
-def ended(vehicle: Vehicle) -> None:
+def ended(vehicle: AutopilotVehicle) -> None:
     """Enter AUTO.LOITER after the mission."""
     _finish(vehicle)
     vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _loiter(vehicle))
 
 
-def _finish(vehicle: Vehicle) -> None:
+def _finish(vehicle: AutopilotVehicle) -> None:
     """Note and report that the mission has ended."""
     commander = commander_of(vehicle)
     commander.mission_finished = True
@@ -132,12 +132,12 @@ def _finish(vehicle: Vehicle) -> None:
         )
 
 
-def _loiter(vehicle: Vehicle) -> None:
+def _loiter(vehicle: AutopilotVehicle) -> None:
     if vehicle.armed and not vehicle.landed and vehicle.mode.number == modes.MISSION:
         commander_of(vehicle).continue_with(modes.LOITER)
 
 
-def act(vehicle: Vehicle, item: MissionItem) -> None:
+def act(vehicle: AutopilotVehicle, item: MissionItem) -> None:
     """Execute an item that does not navigate."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
         vehicle.commanded.speed = item.param2
@@ -156,7 +156,7 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
 MISSION_RULES = MissionRules(first_item=0, item_begins=item_begins, item_done=item_done, act=act, ended=ended)
 
 
-class ReturnFromMission(Manoeuvre):
+class ReturnFromMission(FlightManoeuvre):
     """Item RETURN_TO_LAUNCH: enter AUTO.RTL."""
 
     def step(self) -> None:
@@ -173,10 +173,10 @@ class ReturnFromMission(Manoeuvre):
 _NO_COMMAND = Command(RETURN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GLOBAL_RELATIVE, is_int=False)
 
 
-class LandAt(Manoeuvre):
+class MissionLand(FlightManoeuvre):
     """Fly level to a point and land there; without a point, land here."""
 
-    def __init__(self, vehicle: Vehicle, point: Vector | None) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector | None) -> None:
         super().__init__(vehicle)
         self._landing = Descent(vehicle, point)
         down = vehicle.estimate.position[2]
@@ -199,10 +199,10 @@ class LandAt(Manoeuvre):
 class FlyToItem(Hold):
     """Fly to the point of an item; from the ground, climb vertically to its height first."""
 
-    def __init__(self, vehicle: Vehicle, point: Vector, yaw: float | None) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, point: Vector, yaw: float | None) -> None:
         super().__init__(vehicle, point, yaw)
         self.slow_start = True
-        self._climbing: TakeOff | None = TakeOff(vehicle, point[2]) if vehicle.landed else None
+        self._climbing: Px4TakeOff | None = Px4TakeOff(vehicle, point[2]) if vehicle.landed else None
 
     def enter(self) -> None:
         """Start with the climb, if the vehicle is on the ground."""
@@ -225,20 +225,20 @@ class FlyToItem(Hold):
             super().step()
 
 
-def leg(vehicle: Vehicle, item: MissionItem, _goes_on: bool) -> Leg:
+def leg(vehicle: AutopilotVehicle, item: MissionItem, _goes_on: bool) -> Leg:
     """Return the leg of a multirotor for an item that navigates."""
     if item.command == TAKEOFF:
-        climbing = TakeOff(vehicle, point_height(vehicle, item))
+        climbing = Px4TakeOff(vehicle, point_height(vehicle, item))
         return Leg(climbing, climbing.arrived)
     if item.command == LAND:
         place = item_point(vehicle, item) if item.has_place else None
-        return Leg(LandAt(vehicle, place), lambda: vehicle.landed)
+        return Leg(MissionLand(vehicle, place), lambda: vehicle.landed)
     if item.command == RETURN:
         return Leg(ReturnFromMission(vehicle), lambda: False)
     return _go(vehicle, item)
 
 
-def _go(vehicle: Vehicle, item: MissionItem) -> Leg:
+def _go(vehicle: AutopilotVehicle, item: MissionItem) -> Leg:
     p = vehicle.parameters
     point = vehicle.estimate.position if item.command == DELAY else item_point(vehicle, item)
     far = not Hold(vehicle, point).near(p["NAV_ACC_RAD"], 1e9)

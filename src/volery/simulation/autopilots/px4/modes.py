@@ -23,12 +23,12 @@ from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.external_vision import ExternalVision
 from volery.simulation.autopilots.px4.geofence import fence_breach
 from volery.simulation.autopilots.px4.home_correction import HomeCorrection
-from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
+from volery.simulation.autopilots.px4.offboard import ManualControlState, OffboardSetpoints
 from volery.simulation.autopilots.px4.position_control import PositionLoops
-from volery.simulation.autopilots.px4.simulated_faults import SimulatedFaults
-from volery.simulation.autopilots.px4.versions import ALTITUDE_CRUISE, EXTERNAL, POSITION_SLOW, Version
+from volery.simulation.autopilots.px4.simulated_faults import FaultInjector
+from volery.simulation.autopilots.px4.versions import ALTITUDE_CRUISE, EXTERNAL, POSITION_SLOW, Px4Version
 from volery.simulation.autopilots.state_groups import NEVER, Home
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre, Mode
 from volery.trace.events import CRITICAL, INFO
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
@@ -64,25 +64,27 @@ AUTOMATIC = frozenset({TAKEOFF, LOITER, MISSION, RTL, LAND, ORBIT, FOLLOW})
 """Modes that moved sticks take over."""
 
 _MODES = (
-    Mode(MANUAL, "MANUAL", MANUAL_BITS, Manoeuvre, pilot=True),
-    Mode(ALTCTL, "ALTCTL", MANUAL_BITS, Manoeuvre, pilot=True),
-    Mode(POSCTL, "POSCTL", MANUAL_BITS, Manoeuvre, pilot=True),
-    Mode(ORBIT, "ORBIT", OFFBOARD_BITS, Manoeuvre, needs_position=True, armable=False),
-    Mode(ACRO, "ACRO", RATE_BITS, Manoeuvre, pilot=True),
-    Mode(OFFBOARD, "OFFBOARD", OFFBOARD_BITS, Manoeuvre, needs_position=True),
-    Mode(STABILIZE, "STABILIZED", MANUAL_BITS, Manoeuvre, pilot=True),
-    Mode(TAKEOFF, "AUTO.TAKEOFF", AUTO_BITS, Manoeuvre, needs_position=True),
-    Mode(LOITER, "AUTO.LOITER", AUTO_BITS, Manoeuvre, needs_position=True),
-    Mode(MISSION, "AUTO.MISSION", AUTO_BITS, Manoeuvre, needs_position=True),
-    Mode(RTL, "AUTO.RTL", AUTO_BITS, Manoeuvre, needs_position=True, armable=False),
-    Mode(LAND, "AUTO.LAND", AUTO_BITS, Manoeuvre, armable=False),
-    Mode(FOLLOW, "AUTO.FOLLOW", OFFBOARD_BITS, Manoeuvre, needs_position=True, armable=False),
-    Mode(TERMINATION, "TERMINATION", CUSTOM, Manoeuvre, armable=False),
+    Mode(MANUAL, "MANUAL", MANUAL_BITS, FlightManoeuvre, pilot=True),
+    Mode(ALTCTL, "ALTCTL", MANUAL_BITS, FlightManoeuvre, pilot=True),
+    Mode(POSCTL, "POSCTL", MANUAL_BITS, FlightManoeuvre, pilot=True),
+    Mode(ORBIT, "ORBIT", OFFBOARD_BITS, FlightManoeuvre, needs_position=True, armable=False),
+    Mode(ACRO, "ACRO", RATE_BITS, FlightManoeuvre, pilot=True),
+    Mode(OFFBOARD, "OFFBOARD", OFFBOARD_BITS, FlightManoeuvre, needs_position=True),
+    Mode(STABILIZE, "STABILIZED", MANUAL_BITS, FlightManoeuvre, pilot=True),
+    Mode(TAKEOFF, "AUTO.TAKEOFF", AUTO_BITS, FlightManoeuvre, needs_position=True),
+    Mode(LOITER, "AUTO.LOITER", AUTO_BITS, FlightManoeuvre, needs_position=True),
+    Mode(MISSION, "AUTO.MISSION", AUTO_BITS, FlightManoeuvre, needs_position=True),
+    Mode(RTL, "AUTO.RTL", AUTO_BITS, FlightManoeuvre, needs_position=True, armable=False),
+    Mode(LAND, "AUTO.LAND", AUTO_BITS, FlightManoeuvre, armable=False),
+    Mode(FOLLOW, "AUTO.FOLLOW", OFFBOARD_BITS, FlightManoeuvre, needs_position=True, armable=False),
+    Mode(TERMINATION, "TERMINATION", CUSTOM, FlightManoeuvre, armable=False),
 )
 """What the kinds of vehicles share of each mode, without its manoeuvre."""
 
 
-def mode_table(manoeuvres: Mapping[int, Callable[[Vehicle], Manoeuvre]], *, flies: bool) -> dict[int, Mode]:
+def mode_table(
+    manoeuvres: Mapping[int, Callable[[AutopilotVehicle], FlightManoeuvre]], *, flies: bool
+) -> dict[int, Mode]:
     """Return the modes of one kind of vehicle.
 
     Args:
@@ -148,28 +150,28 @@ end.
 """
 
 
-class Commander:
-    """State that only PX4 keeps about a vehicle (``Vehicle.firmware_state``).
+class CommanderState:
+    """State that only PX4 keeps about a vehicle (``AutopilotVehicle.firmware_state``).
 
     Args:
         vehicle: The vehicle.
         version: Version of the firmware.
     """
 
-    def __init__(self, vehicle: Vehicle, version: Version) -> None:
+    def __init__(self, vehicle: AutopilotVehicle, version: Px4Version) -> None:
         self.vehicle = vehicle
         self.version = version
         self.reset()
 
     def reset(self) -> None:
         """Reset to the state after a boot."""
-        self.faults, self.vision = SimulatedFaults(self.vehicle), ExternalVision(self.vehicle)
+        self.faults, self.vision = FaultInjector(self.vehicle), ExternalVision(self.vehicle)
         self._forget_mission()
         self._refused_at: Ns = NEVER
-        self.joystick = Joystick()
-        self.stream = SetpointStream()
+        self.joystick = ManualControlState()
+        self.stream = OffboardSetpoints()
         self.control = PositionLoops(self.vehicle)
-        self.log = event_interface.EventLog(self.vehicle, self.version.events)
+        self.log = event_interface.EventBuffer(self.vehicle, self.version.events)
         self.home_correction = HomeCorrection(self.vehicle) if self.version.corrects_home else None
         self.requested = LOITER
         """Mode that the user requested."""
@@ -576,7 +578,7 @@ MODES_IN_EVENTS: Mapping[tuple[int, int], int] = {
 """``navigation_mode_t`` of the event interface, by main mode and sub-mode."""
 
 
-def commander_of(vehicle: Vehicle) -> Commander:
+def commander_of(vehicle: AutopilotVehicle) -> CommanderState:
     """Return the commander of a vehicle."""
-    commander: Commander = vehicle.firmware_state
+    commander: CommanderState = vehicle.firmware_state
     return commander

@@ -25,10 +25,10 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_TERRAIN_INT,
     LOCAL_NED,
 )
-from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
+from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventBuffer
 from volery.simulation.autopilots.px4.position_control import PositionLoops, Wanted
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle, FlightManoeuvre
 from volery.trace.events import CRITICAL
 
 INVALID = 32_767
@@ -65,7 +65,7 @@ def deflection(fields: Mapping[str, Any]) -> StickDeflection | None:
     return StickDeflection(*within)
 
 
-class Joystick:
+class ManualControlState:
     """State of one vehicle's manual control."""
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ class Joystick:
         return self.valid and any(abs(value - rested) > share for value, rested in pairs)
 
 
-def set_rc_channels(vehicle: Vehicle, given: StickDeflection) -> None:
+def set_rc_channels(vehicle: AutopilotVehicle, given: StickDeflection) -> None:
     """Write the sticks to the RC channels, which the generic manoeuvres read."""
     now = vehicle.kernel.now()
     axes = {ROLL: given.roll, PITCH: -given.pitch, THROTTLE: given.throttle, YAW: given.yaw}
@@ -141,7 +141,7 @@ class OffboardTarget(NamedTuple):
         return self.position[2] < down or self.velocity[2] < 0.0 or self.acceleration[2] < 0.0
 
 
-class AttitudeTarget(NamedTuple):
+class OffboardAttitude(NamedTuple):
     """Attitude, or a yaw rate in place of its heading, and a collective thrust 0..1."""
 
     attitude: Quaternion
@@ -156,11 +156,11 @@ class RateTarget(NamedTuple):
     thrust: float
 
 
-StreamTarget = OffboardTarget | AttitudeTarget | RateTarget
+StreamTarget = OffboardTarget | OffboardAttitude | RateTarget
 """What a set-point of the stream commands."""
 
 
-class SetpointStream:
+class OffboardSetpoints:
     """The last set-point of one vehicle."""
 
     def __init__(self) -> None:
@@ -188,7 +188,7 @@ def _asked(values: Vector) -> bool:
     return any(isfinite(value) for value in values)
 
 
-def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
+def _turned(vehicle: AutopilotVehicle, vector: Vector) -> Vector:
     """Rotate forward-right-down to north-east-down by the heading alone; missing values count as 0."""
     if not _asked((*vector[:2], nan)):
         return nan, nan, vector[2]
@@ -210,7 +210,9 @@ def _target(fields: dict[str, Any], position: Vector) -> OffboardTarget | None:
     return OffboardTarget(position, velocity, push, yaw if rate is None else None, rate)
 
 
-def local_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> OffboardTarget | None:
+def local_target(
+    vehicle: AutopilotVehicle, fields: dict[str, Any], log: EventBuffer
+) -> OffboardTarget | None:
     """Parse SET_POSITION_TARGET_LOCAL_NED, and report a refusal."""
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_LOCAL_NED"
@@ -231,7 +233,9 @@ def local_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Off
     return target
 
 
-def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> OffboardTarget | None:
+def global_target(
+    vehicle: AutopilotVehicle, fields: dict[str, Any], log: EventBuffer
+) -> OffboardTarget | None:
     """Parse SET_POSITION_TARGET_GLOBAL_INT, and report a refusal. Terrain heights count above home."""
     mask, frame = fields["type_mask"], fields["coordinate_frame"]
     message = "SET_POSITION_TARGET_GLOBAL_INT"
@@ -248,7 +252,7 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Of
     return target
 
 
-def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | RateTarget | None:
+def attitude_target(fields: dict[str, Any]) -> OffboardAttitude | RateTarget | None:
     """Parse SET_ATTITUDE_TARGET: its attitude, else its body rates; None if it is invalid."""
     mask = fields["type_mask"]
     if mask & THRUST_IGNORED or not all_within((fields["thrust"],)):
@@ -267,13 +271,13 @@ def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | RateTarget | Non
     given = not mask & YAW_RATE_IGNORED and isfinite(fields["body_yaw_rate"])
     rate = fields["body_yaw_rate"] if given else None
     thrust = min(1.0, max(0.0, fields["thrust"]))
-    return AttitudeTarget((w / size, x / size, y / size, z / size), rate, thrust)
+    return OffboardAttitude((w / size, x / size, y / size, z / size), rate, thrust)
 
 
-class FollowTarget(Manoeuvre):
+class FollowOffboard(FlightManoeuvre):
     """Follow an ``OffboardTarget`` axis by axis; without one, hold."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self._setpoint: OffboardTarget | None = None
 
@@ -307,14 +311,14 @@ class FollowTarget(Manoeuvre):
         )
 
 
-class Offboard(Manoeuvre):
-    """Mode OFFBOARD: position and velocity set-points by ``FollowTarget``, attitudes and rates directly."""
+class Offboard(FlightManoeuvre):
+    """Mode OFFBOARD: position and velocity set-points by ``FollowOffboard``, attitudes and rates directly."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         super().__init__(vehicle)
         self.slow_start = True
-        self._follower = FollowTarget(vehicle)
-        self._attitude: AttitudeTarget | RateTarget | None = None
+        self._follower = FollowOffboard(vehicle)
+        self._attitude: OffboardAttitude | RateTarget | None = None
 
     def enter(self) -> None:
         """Hold until a set-point arrives."""
@@ -323,7 +327,7 @@ class Offboard(Manoeuvre):
 
     def receive(self, target: StreamTarget | None) -> None:
         """Follow a new set-point."""
-        self._attitude = target if isinstance(target, AttitudeTarget | RateTarget) else None
+        self._attitude = target if isinstance(target, OffboardAttitude | RateTarget) else None
         if isinstance(target, OffboardTarget):
             self._follower.follow(target)
         self.target = None if self._attitude else self._follower.target

@@ -59,7 +59,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     TO_POINT,
 )
 from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
-from volery.simulation.autopilots.vehicle_state import IDLE, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, AutopilotVehicle
 from volery.simulation.world.body_specs import Multirotor
 
 FOLLOW_LEAD = 0.25
@@ -132,7 +132,7 @@ class Wanted(NamedTuple):
     accel: Vector
 
 
-def gains_of(vehicle: Vehicle, automatic: bool) -> tuple[float, ...]:
+def gains_of(vehicle: AutopilotVehicle, automatic: bool) -> tuple[float, ...]:
     """Return limits and gains of the loops, in the order of the columns from ``G_JERK`` on.
 
     Args:
@@ -160,7 +160,7 @@ def gains_of(vehicle: Vehicle, automatic: bool) -> tuple[float, ...]:
     )
 
 
-def airframe_of(vehicle: Vehicle) -> Vector:
+def airframe_of(vehicle: AutopilotVehicle) -> Vector:
     """Return linear drag over mass [1/s], quadratic drag over mass [1/m] and hover thrust of the airframe."""
     spec = vehicle.flight.spec
     if not isinstance(spec, Multirotor) or not spec.frame:
@@ -191,7 +191,7 @@ def _write(row: memoryview[float], column: int, values: Sequence[float]) -> None
 class PositionLoops:
     """Trajectory and loops of one vehicle; they outlast changes between the modes that use them."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self._noisy = vehicle.flight.spec.sensors == "sih"
         """Whether the loops fly after the noise of gyroscope and accelerometer. That of the other sets is at

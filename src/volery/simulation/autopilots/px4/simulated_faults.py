@@ -9,7 +9,7 @@ from __future__ import annotations
 from volery.base.elementary import exp
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 LEAST_SATELLITES = 4
 """With fewer the receiver has no fix."""
@@ -26,10 +26,10 @@ ALMOST_EMPTY = 0.02
 """Charge at which an emptied battery is left: the motors go on turning, as in the original."""
 
 
-class SimulatedFaults:
+class FaultInjector:
     """Injects faults into one vehicle; ``step`` is called at each tick."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: AutopilotVehicle) -> None:
         self._vehicle = vehicle
         self.emptied = False
         """Whether the battery is empty by INJECT_FAILURE."""

@@ -28,7 +28,7 @@ from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION, R
 from volery.simulation.autopilots.px4 import modes
 from volery.simulation.autopilots.px4.flight_modes import Orbit
 from volery.simulation.autopilots.px4.modes import ATTITUDE_AFTER, commander_of
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget, RateTarget
+from volery.simulation.autopilots.px4.offboard import OffboardAttitude, RateTarget
 from volery.simulation.autopilots.px4.versions import (
     ADVANCED,
     EXTERNAL,
@@ -36,7 +36,7 @@ from volery.simulation.autopilots.px4.versions import (
     SIMPLE_MODES,
     STANDARD_MODES,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import AutopilotVehicle
 
 GLOBAL_AFTER: Ns = 6_500 * MS
 """Recorded: the first GLOBAL_POSITION_INT 0.1 s after the first ATTITUDE."""
@@ -47,21 +47,21 @@ HOME_FROM: Ns = 2_200 * MS
 NOT_KNOWN = 65_535
 
 
-def _aligned(vehicle: Vehicle) -> bool:
+def _aligned(vehicle: AutopilotVehicle) -> bool:
     return vehicle.uptime() >= ATTITUDE_AFTER
 
 
-def attitude(vehicle: Vehicle) -> Fields | None:
+def attitude(vehicle: AutopilotVehicle) -> Fields | None:
     """Return ATTITUDE once the estimator is aligned."""
     return messages.attitude(vehicle) if _aligned(vehicle) else None
 
 
-def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
+def attitude_quaternion(vehicle: AutopilotVehicle) -> Fields | None:
     """Return ATTITUDE_QUATERNION once the estimator is aligned."""
     return messages.attitude_quaternion(vehicle) if _aligned(vehicle) else None
 
 
-def global_position(vehicle: Vehicle) -> Fields | None:
+def global_position(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GLOBAL_POSITION_INT once there is a position; PX4 cuts decimals off and does not round."""
     estimate = vehicle.estimate
     if vehicle.uptime() < GLOBAL_AFTER or not estimate.position_ok:
@@ -81,7 +81,7 @@ def global_position(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def local_position(vehicle: Vehicle) -> Fields:
+def local_position(vehicle: AutopilotVehicle) -> Fields:
     """Return LOCAL_POSITION_NED, with zeros before the first position."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle)}
@@ -91,7 +91,7 @@ def local_position(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def odometry(vehicle: Vehicle) -> Fields:
+def odometry(vehicle: AutopilotVehicle) -> Fields:
     """Return ODOMETRY."""
     estimate = vehicle.estimate
     p, q, r = estimate.rates
@@ -126,7 +126,7 @@ def _diagonal(*variances: float) -> tuple[float, ...]:
     return tuple(values)
 
 
-def altitude(vehicle: Vehicle) -> Fields:
+def altitude(vehicle: AutopilotVehicle) -> Fields:
     """Return ALTITUDE."""
     estimate = vehicle.estimate
     return {
@@ -140,7 +140,7 @@ def altitude(vehicle: Vehicle) -> Fields:
     }
 
 
-def vfr_hud(vehicle: Vehicle) -> Fields:
+def vfr_hud(vehicle: AutopilotVehicle) -> Fields:
     """Return VFR_HUD (no airspeed sensor)."""
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
@@ -154,7 +154,7 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
     }
 
 
-def highres_imu(vehicle: Vehicle) -> Fields:
+def highres_imu(vehicle: AutopilotVehicle) -> Fields:
     """Return HIGHRES_IMU (m/s^2, rad/s, gauss; pressure in Pa, as PX4 1.14 sends it)."""
     estimate = vehicle.estimate
     xacc, yacc, zacc = estimate.accel
@@ -178,12 +178,12 @@ def highres_imu(vehicle: Vehicle) -> Fields:
     }
 
 
-def pressure(vehicle: Vehicle) -> Fields:
+def pressure(vehicle: AutopilotVehicle) -> Fields:
     """Return SCALED_PRESSURE."""
     return {"time_boot_ms": boot_ms(vehicle), "press_abs": vehicle.estimate.pressure, "temperature": 1479}
 
 
-def gps_raw(vehicle: Vehicle) -> Fields:
+def gps_raw(vehicle: AutopilotVehicle) -> Fields:
     """Return GPS_RAW_INT."""
     fix = vehicle.estimate.gps
     if fix.fix_type == 0:
@@ -208,13 +208,13 @@ def gps_raw(vehicle: Vehicle) -> Fields:
     }
 
 
-def system_time(vehicle: Vehicle) -> Fields:
+def system_time(vehicle: AutopilotVehicle) -> Fields:
     """Return SYSTEM_TIME."""
     now = EPOCH_US + vehicle.kernel.now() // US
     return {"time_unix_usec": now, "time_boot_ms": boot_ms(vehicle)}
 
 
-def position_target(vehicle: Vehicle) -> Fields:
+def position_target(vehicle: AutopilotVehicle) -> Fields:
     """Return POSITION_TARGET_LOCAL_NED, with NaN where nothing is controlled."""
     estimate = vehicle.estimate
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "coordinate_frame": 1}
@@ -228,7 +228,7 @@ def position_target(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def global_target(vehicle: Vehicle) -> Fields | None:
+def global_target(vehicle: AutopilotVehicle) -> Fields | None:
     """Return POSITION_TARGET_GLOBAL_INT while the vehicle flies to a point."""
     target = vehicle.manoeuvre.target
     if target is None or not vehicle.armed:
@@ -248,18 +248,18 @@ def global_target(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def attitude_target(vehicle: Vehicle) -> Fields:
+def attitude_target(vehicle: AutopilotVehicle) -> Fields:
     """Return ATTITUDE_TARGET."""
     estimate = vehicle.estimate
     wanted = commander_of(vehicle).stream.target
     thrust = estimate.throttle
     angles = estimate.target_attitude
-    if vehicle.mode.number == modes.OFFBOARD and isinstance(wanted, AttitudeTarget):
+    if vehicle.mode.number == modes.OFFBOARD and isinstance(wanted, OffboardAttitude):
         angles, thrust = quaternion_to_euler(wanted.attitude), wanted.thrust
     return {"time_boot_ms": boot_ms(vehicle), "q": euler_to_quaternion(*angles), "thrust": thrust}
 
 
-def home_position(vehicle: Vehicle) -> Fields | None:
+def home_position(vehicle: AutopilotVehicle) -> Fields | None:
     """Return HOME_POSITION; until it is set, the position of the GPS receiver."""
     home = vehicle.home
     fields: Fields = {"q": (1.0, 0.0, 0.0, 0.0), "time_usec": boot_us(vehicle)}
@@ -278,7 +278,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
     return fields
 
 
-def origin(vehicle: Vehicle) -> Fields | None:
+def origin(vehicle: AutopilotVehicle) -> Fields | None:
     """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
     if not vehicle.estimate.position_ok and not commander_of(vehicle).vision.aiding.placed:
         return None
@@ -291,7 +291,7 @@ def origin(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def distance_sensor(vehicle: Vehicle) -> Fields:
+def distance_sensor(vehicle: AutopilotVehicle) -> Fields:
     """Return DISTANCE_SENSOR (downwards); the recorded airframe has one with a range of 100 m."""
     height = max(0.0, commander_of(vehicle).above_ground)
     return {
@@ -302,7 +302,7 @@ def distance_sensor(vehicle: Vehicle) -> Fields:
     }
 
 
-def orbit_status(vehicle: Vehicle) -> Fields | None:
+def orbit_status(vehicle: AutopilotVehicle) -> Fields | None:
     """Return ORBIT_EXECUTION_STATUS while the vehicle circles."""
     circling = vehicle.manoeuvre
     if not isinstance(circling, Orbit):
@@ -343,7 +343,7 @@ WITH_POSITION, WITHOUT_POSITION = 831, 1
 """ESTIMATOR_STATUS_FLAGS as recorded with a position; without one only the attitude is valid."""
 
 
-def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
+def heartbeat(vehicle: AutopilotVehicle, kind: int) -> Fields:
     """Return HEARTBEAT of a vehicle of that MAV_TYPE."""
     commander, mode = commander_of(vehicle), vehicle.mode
     base = mode.base_mode
@@ -367,7 +367,7 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     }
 
 
-def sys_status(vehicle: Vehicle) -> Fields:
+def sys_status(vehicle: AutopilotVehicle) -> Fields:
     """Return SYS_STATUS."""
     estimate = vehicle.estimate
     present, enabled, healthy = PRESENT, ENABLED, HEALTHY
@@ -389,11 +389,11 @@ def sys_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def _percent(vehicle: Vehicle) -> int:
+def _percent(vehicle: AutopilotVehicle) -> int:
     return min(100, max(0, int(vehicle.estimate.battery_left * 100.0)))
 
 
-def battery_status(vehicle: Vehicle) -> Fields:
+def battery_status(vehicle: AutopilotVehicle) -> Fields:
     """Return BATTERY_STATUS."""
     estimate = vehicle.estimate
     return {
@@ -410,14 +410,14 @@ def battery_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def _charge_state(vehicle: Vehicle) -> int:
+def _charge_state(vehicle: AutopilotVehicle) -> int:
     """Return the MAV_BATTERY_CHARGE_STATE."""
     left, p = vehicle.estimate.battery_left, vehicle.parameters
     levels = (p["BAT_LOW_THR"], p["BAT_CRIT_THR"], p["BAT_EMERGEN_THR"])
     return 1 + sum(left < level for level in levels)
 
 
-def extended_sys_state(vehicle: Vehicle) -> Fields:
+def extended_sys_state(vehicle: AutopilotVehicle) -> Fields:
     """Return EXTENDED_SYS_STATE."""
     manoeuvre = vehicle.manoeuvre
     state = IN_AIR
@@ -430,7 +430,7 @@ def extended_sys_state(vehicle: Vehicle) -> Fields:
     return {"vtol_state": 0, "landed_state": state}
 
 
-def estimator_status(vehicle: Vehicle) -> Fields:
+def estimator_status(vehicle: AutopilotVehicle) -> Fields:
     """Return ESTIMATOR_STATUS."""
     estimate = vehicle.estimate
     plane, height, _, _ = estimate.sigmas
@@ -449,7 +449,7 @@ def estimator_status(vehicle: Vehicle) -> Fields:
     }
 
 
-def servo_output(vehicle: Vehicle) -> Fields:
+def servo_output(vehicle: AutopilotVehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW; 900 us is off."""
     pulses = vehicle.estimate.motor_pwm if vehicle.armed else ()
     fields: Fields = {"time_usec": to_uint32(boot_us(vehicle)), "port": 0}
@@ -458,12 +458,12 @@ def servo_output(vehicle: Vehicle) -> Fields:
     return fields
 
 
-def vibration(vehicle: Vehicle) -> Fields:
+def vibration(vehicle: AutopilotVehicle) -> Fields:
     """Return VIBRATION: the body model has none."""
     return {"time_usec": boot_us(vehicle), "vibration_x": 0.0, "vibration_y": 0.1, "vibration_z": 1.3}
 
 
-def mission_current(vehicle: Vehicle) -> Fields | None:
+def mission_current(vehicle: AutopilotVehicle) -> Fields | None:
     """Return MISSION_CURRENT; 1.14 sends it while there is a mission, and the current item only."""
     plan, commander = vehicle.mission, commander_of(vehicle)
     if not commander.version.mission_state:
@@ -488,7 +488,7 @@ def mission_current(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def list_id(vehicle: Vehicle, kind: int) -> int:
+def list_id(vehicle: AutopilotVehicle, kind: int) -> int:
     """Return the checksum of a list on board by its MAV_MISSION_TYPE; 0 of an empty one.
 
     The firmware's has other values; clients compare it only with what it was before.
@@ -504,7 +504,7 @@ IN_MISSION, SUSPENDED = 1, 2
 """``mission_mode``: PX4 counts a take-off and a landing as flying the mission."""
 
 
-def available_modes(vehicle: Vehicle) -> list[Fields]:
+def available_modes(vehicle: AutopilotVehicle) -> list[Fields]:
     """Return AVAILABLE_MODES, all of them: as recorded, but for modes that are not simulated at all."""
     version = commander_of(vehicle).version
     if not version.lists_modes:
@@ -531,7 +531,7 @@ def available_modes(vehicle: Vehicle) -> list[Fields]:
     return listed
 
 
-def current_mode(vehicle: Vehicle) -> Fields | None:
+def current_mode(vehicle: AutopilotVehicle) -> Fields | None:
     """Return CURRENT_MODE: the mode that is flown, and the one that the user requested."""
     commander = commander_of(vehicle)
     if not commander.version.lists_modes:
@@ -543,22 +543,22 @@ def current_mode(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def ping(vehicle: Vehicle) -> Fields:
+def ping(vehicle: AutopilotVehicle) -> Fields:
     """Return PING as a broadcast."""
     return {"time_usec": boot_us(vehicle), "seq": vehicle.uptime() // S}
 
 
-def timesync(vehicle: Vehicle) -> Fields:
+def timesync(vehicle: AutopilotVehicle) -> Fields:
     """Return TIMESYNC as a request."""
     return {"tc1": 0, "ts1": vehicle.uptime()}
 
 
-def event_sequence(vehicle: Vehicle) -> Fields:
+def event_sequence(vehicle: AutopilotVehicle) -> Fields:
     """Return CURRENT_EVENT_SEQUENCE, by which a receiver detects missed events."""
     return {"sequence": commander_of(vehicle).log.latest}
 
 
-def autopilot_version(vehicle: Vehicle) -> Fields:
+def autopilot_version(vehicle: AutopilotVehicle) -> Fields:
     """Return AUTOPILOT_VERSION."""
     version = commander_of(vehicle).version
     return {

@@ -79,10 +79,10 @@ def encode(log: FlightLog) -> bytes:
     out = [_MAGIC + struct.pack("<Q", start), _message(b"B", bytes(40))]
     out += [_information("sys_name", "PX4"), _information("ver_sw_release_str", "v1.14.0")]
     out += [_message(b"F", f"{topic.name}:uint64_t timestamp;{topic.fields};".encode()) for topic in TOPICS]
-    for one in log.parameters:
-        real = one.type == REAL32
-        value = struct.pack("<f", one.value) if real else struct.pack("<i", int(one.value))
-        out.append(_keyed(b"P", f"{'float' if real else 'int32_t'} {one.name}", value))
+    for parameter in log.parameters:
+        real = parameter.type == REAL32
+        value = struct.pack("<f", parameter.value) if real else struct.pack("<i", int(parameter.value))
+        out.append(_keyed(b"P", f"{'float' if real else 'int32_t'} {parameter.name}", value))
     out += [_message(b"A", struct.pack("<BH", 0, topic.number) + topic.name.encode()) for topic in TOPICS]
     for sample in samples:
         out += _rows(sample)

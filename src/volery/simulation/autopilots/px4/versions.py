@@ -13,13 +13,13 @@ from importlib.resources import files
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.autopilot_parameters import (
     NOT_RENAMED,
-    Parameter,
     Renamed,
+    StoredParameter,
     load,
 )
 from volery.simulation.autopilots.mavlink.messages import FAILED
 from volery.simulation.autopilots.px4 import event_interface
-from volery.simulation.autopilots.px4.event_interface import Event
+from volery.simulation.autopilots.px4.event_interface import EventToSend
 
 PACKAGE = "volery.simulation.autopilots.px4"
 
@@ -55,7 +55,7 @@ ADVANCED, NOT_SELECTABLE = 1, 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Version:
+class Px4Version:
     """One version of the firmware."""
 
     name: str
@@ -124,7 +124,7 @@ class Version:
     """Whether DO_FLIGHTTERMINATION enters the mode TERMINATION, and is denied while disarmed."""
     not_landed: str = "Disarming denied: not landed\t"
     """What is said about disarming in flight."""
-    events: Mapping[Event, Event | None] = field(default_factory=dict)
+    events: Mapping[EventToSend, EventToSend | None] = field(default_factory=dict)
     """Events that have another number, or ``None`` where the firmware does not send them."""
     differences: str = ""
     """Start of the names of two files beside 1.14's list: ``.parameters`` are new or have another type or
@@ -139,7 +139,7 @@ class Version:
             return frozenset()
         return frozenset(files(PACKAGE).joinpath(f"{self.differences}.gone").read_text("ascii").split())
 
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[StoredParameter, ...]:
         """Return the parameters of a multirotor in the order of their indices, by the names of 1.14."""
         found = {one.name: one for one in load(PACKAGE, "data/copter.parameters")}
         if self.differences:
@@ -152,7 +152,7 @@ class Version:
         )
 
 
-V1_14 = Version(
+V1_14 = Px4Version(
     name="1.14",
     software=0x010E00FF,
     git_hash=(0, 0, 0, 114, 221, 65, 197, 184),
@@ -201,7 +201,7 @@ V1_14 = Version(
 )
 """1.14.0, of the five recordings of 2023's release."""
 
-V1_17 = Version(
+V1_17 = Px4Version(
     name="1.17",
     software=0x011100FF,
     git_hash=(0, 0, 0, 196, 209, 42, 241, 214),
@@ -233,14 +233,14 @@ V1_17 = Version(
         "Geofence: approaching or outside geofence",
     ),
     events={
-        event_interface.DISARM_REFUSED: Event(0x018AB9B5, 0x62),
+        event_interface.DISARM_REFUSED: EventToSend(0x018AB9B5, 0x62),
         event_interface.RETURN_ACTIVATED: None,
         event_interface.RETURN_HOME: None,
-        event_interface.RETURN_CLIMB: Event(0x01522694, 0x66),
+        event_interface.RETURN_CLIMB: EventToSend(0x01522694, 0x66),
         event_interface.RETURN_FLY: None,
         event_interface.RETURN_DESCEND: None,
-        event_interface.MISSION_TAKEOFF: Event(0x017D425C, 0x66),
-        event_interface.MINIMUM_TAKEOFF: Event(0x013B2FC7, 0x66),
+        event_interface.MISSION_TAKEOFF: EventToSend(0x017D425C, 0x66),
+        event_interface.MINIMUM_TAKEOFF: EventToSend(0x013B2FC7, 0x66),
         event_interface.FENCE_DISTANCE: None,
     },
     differences="data/copter-1.17",
@@ -248,5 +248,5 @@ V1_17 = Version(
 )
 """1.17.0 of 24 April 2026."""
 
-VERSIONS: Mapping[str, Version] = {version.name: version for version in (V1_14, V1_17)}
+VERSIONS: Mapping[str, Px4Version] = {version.name: version for version in (V1_14, V1_17)}
 """By name, the newest last."""

@@ -29,14 +29,14 @@ from volery.vehicles.drivers.mavlink.backend import (
     Backend,
     acceleration_fields,
 )
-from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
+from volery.vehicles.drivers.mavlink.client import FirmwareTraits, MavlinkClient
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 RELEASED = 0
 """Pulse width that gives a channel back to the transmitter."""
 
-ARDUPILOT_FIRMWARE = Firmware(
+ARDUPILOT_FIRMWARE = FirmwareTraits(
     number=constant("MAV_AUTOPILOT_ARDUPILOTMEGA"),
     name="ArduPilot",
     called="an ArduPilot",

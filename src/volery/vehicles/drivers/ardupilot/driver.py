@@ -57,7 +57,7 @@ from volery.vehicles.drivers.steps import (
     mode_step,
     send_nothing,
 )
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.telemetry import Velocity
 
 CONTROL_PERIOD: Ns = 200 * MS
@@ -344,7 +344,7 @@ class ArduPilot(MavlinkDriver):
 
     # -- missions
 
-    def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
+    def _items(self, mission: Sequence[MissionItem]) -> list[PlanItem]:
         return mission_items(mission)
 
     def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
@@ -402,7 +402,7 @@ class ArduPilot(MavlinkDriver):
         return (self._change_mode(mode), self._release_step(), disarmed_step(ask, mode, within))
 
 
-def mission_items(mission: Sequence[MissionItem]) -> list[Item]:
+def mission_items(mission: Sequence[MissionItem]) -> list[PlanItem]:
     """Return the mission as ArduPilot's items. Item 0 is home, which ArduPilot fills in itself."""
     items = [mission_item("MAV_CMD_NAV_WAYPOINT")]
     for one in mission:

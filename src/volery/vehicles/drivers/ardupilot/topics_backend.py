@@ -32,7 +32,7 @@ from volery.vehicles.drivers.mavlink.backend import INT_FRAMES, Ack
 from volery.vehicles.drivers.mavlink.graph_backend import PERIOD, GraphBackend
 from volery.vehicles.drivers.mavlink.mavros_backend import to_ros_yaw_rate
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.telemetry import Answer, Attitude, Battery, Velocity
 
 RELEASED = 0
@@ -223,7 +223,7 @@ class ArduPilotTopics(GraphBackend):
         """Refuse."""
         self._refuse("an attitude")
 
-    def upload(self, items: Sequence[Item]) -> None:
+    def upload(self, items: Sequence[PlanItem]) -> None:
         """Refuse."""
         self._refuse("a mission")
 

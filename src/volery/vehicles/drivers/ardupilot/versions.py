@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from volery.vehicles.firmware_versions import Coverage, Meaning, Rule
+from volery.vehicles.firmware_versions import Coverage, Meaning, VersionRule
 from volery.vehicles.services import ParameterRules, RenamedParameter
 
 COVERAGE = Coverage("ArduPilot", (4, 5), (4, 8))
 
-DRAWN_BACK: Rule[bool] = Rule(
+DRAWN_BACK: VersionRule[bool] = VersionRule(
     "whether the measured heading beside a yaw rate of SET_ATTITUDE_TARGET draws the copter back",
     Meaning((4, 5), False, "AC_AttitudeControl, input_quaternion: the stated rate is fed forward"),
     Meaning(

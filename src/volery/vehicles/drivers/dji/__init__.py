@@ -17,13 +17,13 @@ from volery.vehicles.address import check_options, records_texts
 from volery.vehicles.driver import DriverFactory
 from volery.vehicles.drivers.dji.backend import DjiBackend
 from volery.vehicles.drivers.dji.driver import Dji
-from volery.vehicles.drivers.dji.node_interfaces import DjiSdkInterface, NodeInterface, OsdkRosInterface
+from volery.vehicles.drivers.dji.node_interfaces import DjiSdkInterface, OsdkRosInterface, SdkRequests
 
 __all__ = ["DRIVER", "Dji", "open_driver"]
 
 OPTIONS = ("home_altitude", "names", "namespace", "texts")
 HIGHEST_HOME_M = 9_000.0
-NAMES: Mapping[str, Callable[[Node, str], NodeInterface]] = {
+NAMES: Mapping[str, Callable[[Node, str], SdkRequests]] = {
     OLD_NAMES: DjiSdkInterface,
     NEW_NAMES: OsdkRosInterface,
 }

@@ -33,7 +33,7 @@ from volery.ros.messages.dji_constants import (
 )
 from volery.trace.events import LinkState
 from volery.vehicles.drivers.dji.decoder import DjiDecoder
-from volery.vehicles.drivers.dji.node_interfaces import NodeInterface, ServiceRequest
+from volery.vehicles.drivers.dji.node_interfaces import SdkRequests, ServiceRequest
 from volery.vehicles.drivers.dji.setpoints import SetpointStream
 from volery.vehicles.telemetry import Answer, Telemetry
 
@@ -57,7 +57,7 @@ KEPT = 1000
 """Messages that may wait to be processed; older ones are dropped."""
 
 
-class Ack:
+class SdkAck:
     """Keys of acknowledgements in ``Telemetry.answers``."""
 
     ACTIVATION: Final = "activation"
@@ -71,7 +71,7 @@ class Ack:
 
 def _time_for(key: str) -> Ns:
     """Return the time-out of a request under *key*."""
-    return {Ack.TASK: TASK_ANSWERED_WITHIN, Ack.MISSION: UPLOADED_WITHIN}.get(key, ANSWERED_WITHIN)
+    return {SdkAck.TASK: TASK_ANSWERED_WITHIN, SdkAck.MISSION: UPLOADED_WITHIN}.get(key, ANSWERED_WITHIN)
 
 
 def nothing() -> None:
@@ -95,7 +95,7 @@ class DjiBackend:
         kernel: Kernel,
         node: Node,
         name: str,
-        interface: NodeInterface,
+        interface: SdkRequests,
         *,
         record: bool,
         home_altitude: float,
@@ -266,37 +266,37 @@ class DjiBackend:
 
     def _codes(self, key: str) -> type[IntEnum]:
         """Return the meaning of ``ack_data`` in the answers under *key*."""
-        if key == Ack.AUTHORITY:
+        if key == SdkAck.AUTHORITY:
             return AuthorityAck
-        if key in (Ack.MISSION, Ack.START):
+        if key in (SdkAck.MISSION, SdkAck.START):
             return MissionAck
         if self.is_m100:
-            return M100MotorsAck if key == Ack.MOTORS else M100TaskAck
+            return M100MotorsAck if key == SdkAck.MOTORS else M100TaskAck
         return TaskAck
 
     @property
     def is_busy(self) -> bool:
         """Whether the node of 4.1 is in a take-off or a landing, and answers nothing else until its end."""
-        return self.interface.blocks and Ack.TASK in self._pending
+        return self.interface.blocks and SdkAck.TASK in self._pending
 
     def activate(self) -> None:
         """Activate the SDK where the node does not by itself."""
-        self.request(Ack.ACTIVATION, self.interface.activation(), self.decoder.activate)
+        self.request(SdkAck.ACTIVATION, self.interface.activation(), self.decoder.activate)
 
     def authority(self) -> None:
         """Obtain the control authority."""
-        self.request(Ack.AUTHORITY, self.interface.authority(True), self.decoder.granted)
+        self.request(SdkAck.AUTHORITY, self.interface.authority(True), self.decoder.granted)
 
     def motors(self, on: bool, *, force: bool = False) -> None:
         """Start or stop the motors; *force* stops them in the air, too."""
         ask = self.interface.kill() if force else self.interface.motors(on)
-        self.request(Ack.MOTORS, ask, partial(self.decoder.motors, on))
+        self.request(SdkAck.MOTORS, ask, partial(self.decoder.motors, on))
 
     def task(self, task: int, mode: DisplayMode) -> None:
         """Start a task that enters *mode*; set-points, which would end it, are stopped."""
         self.stream.stop()
         self.decoder.commanded = mode.name
-        self.request(Ack.TASK, self.interface.task(task))
+        self.request(SdkAck.TASK, self.interface.task(task))
 
     def follow_gimbal(self) -> None:
         """Subscribe to the angles of the gimbal, at its first use: few aircraft carry one."""

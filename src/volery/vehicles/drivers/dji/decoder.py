@@ -213,7 +213,7 @@ class DjiDecoder:
 
     def _rc(self, message: Any) -> None:
         """Decode sticks and switches; any move of the mode switch takes the authority."""
-        axes = [float(one) for one in message.axes]
+        axes = [float(axis) for axis in message.axes]
         if len(axes) <= SWITCH_AXIS:
             return
         switch = self._switch = axes[SWITCH_AXIS]
@@ -224,8 +224,8 @@ class DjiDecoder:
         elif self._taken == "RC" and switch == self._granted_at:
             self._taken = ""
         at_program = self._granted_at is None or switch == self._granted_at
-        shares = [one / max(1.0, abs(one)) for one in axes]  # some switches are in ten-thousandths
-        channels = [pulse_of(one) for one in shares]
+        shares = [axis / max(1.0, abs(axis)) for axis in axes]  # some switches are in ten-thousandths
+        channels = [pulse_of(share) for share in shares]
         channels[SWITCH_AXIS] = PROGRAM_MAY_FLY if at_program else PILOT_FLIES
         if self._transmitter not in {UNKNOWN, CONNECTED}:  # the last values are repeated
             channels = [0] * len(channels)

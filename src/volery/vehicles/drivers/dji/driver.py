@@ -15,7 +15,7 @@ from volery.base.frames import LocalFrame, heading_to_yaw
 from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
+from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, DocumentedBehaviour
 from volery.vehicles.driver import (
     AttitudeTarget,
     Capability,
@@ -36,9 +36,9 @@ from volery.vehicles.drivers.dji.setpoints import (
     OBEYED_WITHIN,
     STILL,
     UP_M_S,
-    Manual,
     Moving,
-    Point,
+    SdkManual,
+    SdkPoint,
     Tilted,
     yaw_of,
 )
@@ -136,8 +136,8 @@ class Dji(SetpointDriver):
 
         frame = LocalFrame(goal.latitude, goal.longitude)
 
-        def there() -> Point:
-            return Point(frame, height, yaw_of(self.telemetry), speed)
+        def there() -> SdkPoint:
+            return SdkPoint(frame, height, yaw_of(self.telemetry), speed)
 
         return self._steps.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
 
@@ -185,7 +185,7 @@ class Dji(SetpointDriver):
         if self.telemetry.flying and not isfinite(self.telemetry.above_home):
             raise Refused(self.name, f"turn to {degrees:g} degrees", "its height above home is unknown")
 
-        def turn() -> Point | None:
+        def turn() -> SdkPoint | None:
             here = self._steps.over_here(self.telemetry.above_home)
             return here._replace(yaw=heading_to_yaw(radians(degrees))) if here is not None else None
 
@@ -198,7 +198,7 @@ class Dji(SetpointDriver):
     def stabilize(self) -> Sequence[Step]:
         """Enter manual flight by tilt, yaw rate and thrust."""
         check_throttle(self.telemetry, self._stream.held or ManualControl(), LOW_THROTTLE)
-        return self._enter_manual("fly stabilized", Manual(keeps_height=False))
+        return self._enter_manual("fly stabilized", SdkManual(keeps_height=False))
 
     def hand_over(self) -> Sequence[Step]:
         """Stop sending; the switch of the transmitter chooses the mode."""
@@ -206,9 +206,9 @@ class Dji(SetpointDriver):
 
     def altitude_hold(self) -> Sequence[Step]:
         """Enter manual flight by tilt, yaw rate and climb rate."""
-        return self._enter_manual("hold the altitude", Manual(keeps_height=True))
+        return self._enter_manual("hold the altitude", SdkManual(keeps_height=True))
 
-    def _enter_manual(self, ask: str, target: Manual) -> Sequence[Step]:
+    def _enter_manual(self, ask: str, target: SdkManual) -> Sequence[Step]:
         def send() -> None:
             if self._stream.held is None:
                 self._stream.held = ManualControl() if self.telemetry.flying else ManualControl(throttle=0.0)
@@ -253,38 +253,42 @@ ASSUMED: Mapping[str, str] = {
 }
 """What the driver assumes, by subject."""
 
-DOCUMENTED: Mapping[str, Source] = {
-    "altitudes": Source(
+DOCUMENTED: Mapping[str, DocumentedBehaviour] = {
+    "altitudes": DocumentedBehaviour(
         "those of `gps_position` are by pressure: only their difference to where the motors started counts; "
         "AMSL takes the option `home_altitude`",
         f"{HEADERS}; support and users (Onboard-SDK #160, #258; ROS #127)",
     ),
-    "`height_above_takeoff`": Source(
+    "`height_above_takeoff`": DocumentedBehaviour(
         "is another quantity on most aircraft, and not used", f"{HEADERS}; users (Onboard-SDK #160, #218)"
     ),
-    "`gps_health`": Source(
+    "`gps_health`": DocumentedBehaviour(
         f"from {HEALTHY_GPS} on the place counts; below, it freezes while messages go on",
         f"{HEADERS}; nodes 3.8 and 4.1",
     ),
-    "`rc`": Source("any move of the mode switch takes the authority", GUIDES),
-    "set-points in flight": Source(
+    "`rc`": DocumentedBehaviour("any move of the mode switch takes the authority", GUIDES),
+    "set-points in flight": DocumentedBehaviour(
         "horizontal offsets that remain, absolute heights above take-off, 50 Hz; zero velocity brakes and "
         "holds",
         f"{GUIDES}; support (ROS #34; Onboard-SDK #760)",
     ),
-    "task 4": Source("works only while the motors stand: `takeoff()` stops them first", "support (ROS #15)"),
-    "task 6 (land) and task 1 (go home)": Source(
+    "task 4": DocumentedBehaviour(
+        "works only while the motors stand: `takeoff()` stops them first", "support (ROS #15)"
+    ),
+    "task 6 (land) and task 1 (go home)": DocumentedBehaviour(
         "stop the motors at the end by themselves; near home going home lands on the spot, up to 20 m away",
         f"{GUIDES}; support (ROS #199, #469)",
     ),
-    "leaving a landing or a way home": Source(
+    "leaving a landing or a way home": DocumentedBehaviour(
         "impossible with `dji_sdk` 3.8; with `dji_osdk_ros` 4.1 except a landing that was asked for",
         "support (ROS #44); nodes 3.8 and 4.1",
     ),
-    "motors in the air": Source("stop by the kill switch of 4.1 only", f"{GUIDES}; nodes 3.8 and 4.1"),
-    "a failed call": Source("is a refusal by the node of 4.1", "node 4.1"),
-    "`ack_data`": Source("the codes of an answer are named in the error", HEADERS),
-    "`rc_connection_status`": Source(
+    "motors in the air": DocumentedBehaviour(
+        "stop by the kill switch of 4.1 only", f"{GUIDES}; nodes 3.8 and 4.1"
+    ),
+    "a failed call": DocumentedBehaviour("is a refusal by the node of 4.1", "node 4.1"),
+    "`ack_data`": DocumentedBehaviour("the codes of an answer are named in the error", HEADERS),
+    "`rc_connection_status`": DocumentedBehaviour(
         "after 3 s without a transmitter it goes home, or hovers if set so in Assistant 2", GUIDES
     ),
 }

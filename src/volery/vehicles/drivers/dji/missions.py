@@ -23,7 +23,7 @@ from volery.ros.messages.dji_constants import (
     WaypointType,
 )
 from volery.vehicles.driver import ChangeSpeed, Land, MissionItem, ReturnHome, Step, TakeOff, Waypoint
-from volery.vehicles.drivers.dji.backend import Ack, nothing
+from volery.vehicles.drivers.dji.backend import SdkAck, nothing
 from volery.vehicles.drivers.dji.node_interfaces import SECOND_KIND
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, RESEND_PERIOD, SDK, WAITS, DjiSteps, DjiTasks
 from volery.vehicles.drivers.steps import ANSWERED_WITHIN, arrived_at, send_nothing
@@ -38,7 +38,7 @@ GO_ON_WITHOUT_RC = 1
 DAMPING_M = 0.2
 
 
-class Route(NamedTuple):
+class SdkRoute(NamedTuple):
     """A mission as an aircraft of either kind flies it: waypoints, speed in m/s, and the final action."""
 
     points: Sequence[Waypoint]
@@ -46,7 +46,7 @@ class Route(NamedTuple):
     finish: int
 
 
-class Plan(NamedTuple):
+class SdkMission(NamedTuple):
     """A mission for the aircraft.
 
     Args:
@@ -68,7 +68,7 @@ def plan_of(
     here: Position,
     *,
     second_kind: bool = False,
-) -> Plan:
+) -> SdkMission:
     """Return the mission as messages of *package*; a take-off becomes a waypoint above the present place.
 
     Args:
@@ -96,10 +96,10 @@ def plan_of(
     if second_kind and any(point.stay_s > 0.0 for point in points):
         raise UsageError(f"{name}: a mission of an M300 does not stay at waypoints; goto() and hold() do")
     task = _settings(route, home) if second_kind else _task(package, route, home)
-    return Plan(task, takeoff, points[-1].position if route.finish == NO_ACTION else None)
+    return SdkMission(task, takeoff, points[-1].position if route.finish == NO_ACTION else None)
 
 
-def _route(name: str, above: Sequence[Waypoint], items: Sequence[MissionItem]) -> Route:
+def _route(name: str, above: Sequence[Waypoint], items: Sequence[MissionItem]) -> SdkRoute:
     """Return the route through the waypoint *above* the place of take-off, if there is one, and *items*."""
     points = list(above)
     speeds: set[float] = set()
@@ -120,7 +120,7 @@ def _route(name: str, above: Sequence[Waypoint], items: Sequence[MissionItem]) -
             raise UsageError(f"{name}: mission item {number}: a DJI mission takes off first or not at all")
     if len(speeds) > 1:
         raise UsageError(f"{name}: a DJI mission has one speed; this one states {sorted(speeds)}")
-    return Route(points, _speed(name, speeds), finish)
+    return SdkRoute(points, _speed(name, speeds), finish)
 
 
 def _over(item: Land, points: Sequence[Waypoint]) -> Position | None:
@@ -138,7 +138,7 @@ def _speed(name: str, speeds: set[float]) -> float:
     return speed
 
 
-def _task(package: str, route: Route, home: Position) -> Any:
+def _task(package: str, route: SdkRoute, home: Position) -> Any:
     turns = any(not isnan(point.heading) for point in route.points)
     made: Any = message_class(f"{package}/msg/MissionWaypointTask")()
     made.velocity_range, made.idle_velocity = MISSION_SPEEDS.highest, route.speed
@@ -170,7 +170,7 @@ def _yaw(point: Waypoint) -> float:
     return (point.heading + 180.0) % 360.0 - 180.0
 
 
-def _settings(route: Route, home: Position) -> Any:
+def _settings(route: SdkRoute, home: Position) -> Any:
     """Return the mission as one of the second kind, whose final actions have the same numbers."""
     made: Any = message_class(SECOND_KIND)()
     made.missTotalLen, made.finishedAction = len(route.points), route.finish
@@ -224,7 +224,7 @@ class MissionRunner:
         self._tasks = tasks
         self._backend = steps.backend
         self._telemetry = steps.telemetry
-        self._plan: Plan | None = None
+        self._plan: SdkMission | None = None
 
     def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
         """Return steps that upload a mission."""
@@ -247,10 +247,10 @@ class MissionRunner:
         uploads = [
             Step(
                 ask=f"take a mission of {count} waypoints",
-                send=partial(self._backend.request, Ack.MISSION, ask, accepted),
-                done=lambda seen: self._steps.accepted(Ack.MISSION),
+                send=partial(self._backend.request, SdkAck.MISSION, ask, accepted),
+                done=lambda seen: self._steps.accepted(SdkAck.MISSION),
                 within=30 * S + count * 2 * S,
-                answer=Ack.MISSION,
+                answer=SdkAck.MISSION,
                 again=5 * S,
             )
             for ask, accepted in (*((one, nothing) for one in before), (last, keep))
@@ -271,9 +271,9 @@ class MissionRunner:
         begin = Step(
             ask="start the mission",
             send=partial(self._begin, plan),
-            done=lambda seen: self._steps.accepted(Ack.START),
+            done=lambda seen: self._steps.accepted(SdkAck.START),
             within=ANSWERED_WITHIN,
-            answer=Ack.START,
+            answer=SdkAck.START,
             again=RESEND_PERIOD,
             enters=FLYING,
             leads_to=(WAITS, SDK),
@@ -281,12 +281,12 @@ class MissionRunner:
         )
         return (*lift, self._steps.authority(), self._steps.quiet(), begin, self._over(plan, within))
 
-    def _begin(self, plan: Plan) -> None:
+    def _begin(self, plan: SdkMission) -> None:
         self._steps.stream.stop()
         self._steps.decoder.commanded = FLYING
-        self._backend.request(Ack.START, self._backend.interface.start_mission(plan.task))
+        self._backend.request(SdkAck.START, self._backend.interface.start_mission(plan.task))
 
-    def _over(self, plan: Plan, within: Ns) -> Step:
+    def _over(self, plan: SdkMission, within: Ns) -> Step:
         """Return a step that ends when disarmed, or at rest at an end in the air."""
         end = plan.end
 

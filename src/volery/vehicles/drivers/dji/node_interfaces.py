@@ -53,7 +53,7 @@ class ServiceRequest(NamedTuple):
     request: Any
 
 
-class NodeInterface(Protocol):
+class SdkRequests(Protocol):
     """Requests that both nodes support. ``None`` means that the node needs no such request."""
 
     namespace: str

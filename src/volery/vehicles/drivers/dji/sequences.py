@@ -13,10 +13,10 @@ from volery.base.frames import LocalFrame
 from volery.base.time import Ns, S
 from volery.ros.messages.dji_constants import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Step
-from volery.vehicles.drivers.dji.backend import Ack, DjiBackend
+from volery.vehicles.drivers.dji.backend import DjiBackend, SdkAck
 from volery.vehicles.drivers.dji.decoder import DESCENDING_MODES, TAKES_OFF
 from volery.vehicles.drivers.dji.node_interfaces import GO_HOME, LAND, TAKE_OFF
-from volery.vehicles.drivers.dji.setpoints import Point, Target, yaw_of
+from volery.vehicles.drivers.dji.setpoints import SdkPoint, Target, yaw_of
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     ARMED_WITHIN,
@@ -74,7 +74,7 @@ class DjiSteps:
             done=lambda seen: self.decoder.activated,
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=Ack.ACTIVATION,
+            answer=SdkAck.ACTIVATION,
             again=RESEND_PERIOD,
             advice="the node activates with app_id and enc_key among its parameters",
         )
@@ -91,11 +91,11 @@ class DjiSteps:
         )
         refer = Step(
             ask="set its local reference",
-            send=lambda: self.backend.request(Ack.REFERENCE, self.backend.interface.reference()),
-            done=lambda seen: seen.armed or self.accepted(Ack.REFERENCE),
+            send=lambda: self.backend.request(SdkAck.REFERENCE, self.backend.interface.reference()),
+            done=lambda seen: seen.armed or self.accepted(SdkAck.REFERENCE),
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=Ack.REFERENCE,
+            answer=SdkAck.REFERENCE,
             again=RESEND_PERIOD,
         )
         activate = self.activated()
@@ -109,7 +109,7 @@ class DjiSteps:
             done=lambda seen: self.decoder.authority,
             within=ANSWERED_WITHIN,
             skippable=True,
-            answer=Ack.AUTHORITY,
+            answer=SdkAck.AUTHORITY,
             again=RESEND_PERIOD,
             advice="the pilot's mode switch must be at P (A3, N3, M210), or at F (M100)",
         )
@@ -138,10 +138,10 @@ class DjiSteps:
         return (
             Step(
                 ask=f"leave {doing}",
-                send=lambda: self.backend.request(Ack.TASK, ask),
+                send=lambda: self.backend.request(SdkAck.TASK, ask),
                 done=lambda seen: seen.mode in {WAITS, SDK},
                 within=ANSWERED_WITHIN,
-                answer=Ack.TASK,
+                answer=SdkAck.TASK,
                 again=RESEND_PERIOD,
                 enters=WAITS,
                 leads_to=(doing,),
@@ -159,7 +159,7 @@ class DjiSteps:
     def to_point(
         self,
         ask: str,
-        point: Callable[[], Point | None],
+        point: Callable[[], SdkPoint | None],
         done: Callable[[Telemetry], bool],
         within: Ns,
     ) -> Sequence[Step]:
@@ -189,12 +189,12 @@ class DjiSteps:
         )
         return (*self.leave_descent(ask), self.authority(), step, self.hover())
 
-    def over_here(self, height: float) -> Point | None:
+    def over_here(self, height: float) -> SdkPoint | None:
         """Return the present place at *height* metres above home; ``None`` without a position."""
         here = self.telemetry.position
         if here is None:
             return None
-        return Point(LocalFrame(here.latitude, here.longitude), height, yaw_of(self.telemetry))
+        return SdkPoint(LocalFrame(here.latitude, here.longitude), height, yaw_of(self.telemetry))
 
     def check_height(self, height: float, asked: str) -> None:
         """Raise ``OutOfBounds`` for a height (m above home) outside the range of set-points."""
@@ -245,7 +245,7 @@ class DjiTasks:
             done=lambda seen: seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=Ack.MOTORS,
+            answer=SdkAck.MOTORS,
             again=RESEND_PERIOD,
             leads_to=STARTS,
         )
@@ -262,7 +262,7 @@ class DjiTasks:
             done=lambda seen: not seen.armed,
             within=ARMED_WITHIN,
             skippable=True,
-            answer=Ack.MOTORS,
+            answer=SdkAck.MOTORS,
             again=RESEND_PERIOD,
             advice=f"while it takes off or lands the node of 4.1 answers nothing: {ONLY_THE_PILOT}"
             if self._backend.interface.blocks
@@ -284,7 +284,7 @@ class DjiTasks:
             send=lambda: self._backend.task(TAKE_OFF, DisplayMode.AUTO_TAKEOFF),
             done=self._off_the_ground,
             within=UP_WITHIN,
-            answer=Ack.TASK,
+            answer=SdkAck.TASK,
             again=RESEND_PERIOD,
             enters=DisplayMode.AUTO_TAKEOFF.name,
             leads_to=STARTS,
@@ -329,7 +329,7 @@ class DjiTasks:
             send=lambda: self._backend.task(task, mode),
             done=lambda seen: seen.mode == mode.name or not seen.armed,
             within=ANSWERED_WITHIN,
-            answer=Ack.TASK,
+            answer=SdkAck.TASK,
             again=RESEND_PERIOD,
             enters=mode.name,
             leads_to=(WAITS, SDK),

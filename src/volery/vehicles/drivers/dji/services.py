@@ -16,7 +16,7 @@ from volery.ros.graph import ServiceError
 from volery.ros.messages.dji_constants import GIMBAL_PITCHES
 from volery.vehicles.drivers.dji.backend import DjiBackend
 from volery.vehicles.drivers.dji.node_interfaces import ServiceRequest
-from volery.vehicles.services import Item, PartialServices
+from volery.vehicles.services import PartialServices, PlanItem
 
 ANSWERED_WITHIN: Ns = 10 * S
 AGAIN: Ns = 2 * S
@@ -88,6 +88,6 @@ class DjiServices(PartialServices):
         if not response.result:
             raise Refused(self._name, asked, refusal)
 
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+    def upload_items(self, kind: int, items: Sequence[PlanItem]) -> None:
         """Raise ``CapabilityError``: ``upload_mission()`` uploads missions."""
         raise self._unsupported("store a plan on board (upload_mission() stores a mission)")

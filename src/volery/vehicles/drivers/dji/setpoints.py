@@ -50,7 +50,7 @@ Setpoint = tuple[int, Sequence[float]]
 """The flag, and four numbers in the conventions of ROS (REP 103)."""
 
 
-class Point(NamedTuple):
+class SdkPoint(NamedTuple):
     """A point: the origin of a frame, metres above home, yaw in rad anticlockwise from east, speed in m/s."""
 
     frame: LocalFrame
@@ -74,13 +74,13 @@ class Tilted(NamedTuple):
     until: Ns
 
 
-class Manual(NamedTuple):
+class SdkManual(NamedTuple):
     """Manual control; with ``keeps_height`` the throttle commands a climb rate, else the thrust."""
 
     keeps_height: bool
 
 
-Target = Point | Moving | Tilted | Manual
+Target = SdkPoint | Moving | Tilted | SdkManual
 
 
 class SetpointStream:
@@ -104,7 +104,7 @@ class SetpointStream:
     @property
     def is_manual(self) -> bool:
         """Whether the target is manual control."""
-        return isinstance(self._target, Manual)
+        return isinstance(self._target, SdkManual)
 
     def follow(self, target: Target) -> None:
         """Send set-points for *target* from now on."""
@@ -147,7 +147,7 @@ class SetpointStream:
 
     def _compute(self) -> Setpoint | None:
         target = self._target
-        if isinstance(target, Point):
+        if isinstance(target, SdkPoint):
             return self._towards(target)
         if isinstance(target, Moving):
             return self._along(target)
@@ -155,7 +155,7 @@ class SetpointStream:
             return self._tilted(target)
         return None if target is None else self._manual(target)
 
-    def _towards(self, target: Point) -> Setpoint | None:
+    def _towards(self, target: SdkPoint) -> Setpoint | None:
         here = self._telemetry.position
         if here is None or not self._decoder.located or not isfinite(self._telemetry.above_home):
             return None
@@ -169,7 +169,7 @@ class SetpointStream:
         share = min(1.0, carrot / away) if away > 0.0 else 1.0
         return POSITION_YAW, (east * share, north * share, target.height, target.yaw)
 
-    def _at_speed(self, target: Point, offset: tuple[float, float], speed: float) -> Setpoint:
+    def _at_speed(self, target: SdkPoint, offset: tuple[float, float], speed: float) -> Setpoint:
         """Fly straight; the climb is spread over the path."""
         away = hypot(*offset)
         climb = target.height - self._telemetry.above_home
@@ -197,7 +197,7 @@ class SetpointStream:
         turn = -min(STICK_YAW_RATE, max(-STICK_YAW_RATE, radians(rate)))
         return ANGLE_YAW_RATE_CLIMB, (*lean, _climb(attitude.thrust), turn)
 
-    def _manual(self, target: Manual) -> Setpoint | None:
+    def _manual(self, target: SdkManual) -> Setpoint | None:
         control = self.held
         if control is None:
             return None

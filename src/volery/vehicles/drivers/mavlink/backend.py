@@ -16,8 +16,8 @@ from volery.base.time import Ns, S, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant
 from volery.vehicles.driver import Acceleration, AttitudeTarget
-from volery.vehicles.firmware_versions import Meaning, Rule
-from volery.vehicles.services import Item, Services
+from volery.vehicles.firmware_versions import Meaning, VersionRule
+from volery.vehicles.services import PlanItem, Services
 from volery.vehicles.telemetry import Telemetry
 
 POSITION_ONLY = 0x0DF8
@@ -34,7 +34,7 @@ MOST_AHEAD_DEG = 20.0
 20 by 7 %.
 """
 
-MEASURED_HEADING: Rule[bool] = Rule(
+MEASURED_HEADING: VersionRule[bool] = VersionRule(
     "whether the measured heading beside a yaw rate draws it back",
     Meaning((0, 0), False, "it turns at the stated rate"),
 )
@@ -88,7 +88,7 @@ class Ack:
 
 def mission_item(
     command: str, *parameters: float, at: Position | None = None, z: float = 0.0, frame: int = ABOVE_HOME
-) -> Item:
+) -> PlanItem:
     """Return a mission item.
 
     Args:
@@ -101,11 +101,11 @@ def mission_item(
     first, second, third, fourth = (*parameters, 0.0, 0.0, 0.0, 0.0)[:4]
     given = (first, second, third, fourth)
     if at is None:
-        return Item(constant(command), frame, given, 0.0, 0.0, z)
+        return PlanItem(constant(command), frame, given, 0.0, 0.0, z)
     at_frame = FRAMES.get(type(at.altitude))
     if at_frame is None:
         raise UsageError(f"{at}: autopilots take AMSL, AboveHome and AboveGround")
-    return Item(constant(command), at_frame, given, at.latitude, at.longitude, at.altitude.metres)
+    return PlanItem(constant(command), at_frame, given, at.latitude, at.longitude, at.altitude.metres)
 
 
 def acceleration_fields(acceleration: Acceleration, yaw_rate: float) -> dict[str, Any]:
@@ -132,7 +132,7 @@ class AttitudeStream:
         drawn_back: whether the measured heading beside a yaw rate would draw the firmware back.
     """
 
-    def __init__(self, kernel: Kernel, turning: int, drawn_back: Rule[bool]) -> None:
+    def __init__(self, kernel: Kernel, turning: int, drawn_back: VersionRule[bool]) -> None:
         self._kernel = kernel
         self._turning = turning
         self._drawn_back = drawn_back
@@ -221,7 +221,7 @@ class Backend(Protocol):
     def failing_checks(self) -> Sequence[str]:
         """Return the arming checks that are known to fail now; where they arrive as texts, nothing."""
 
-    def upload(self, items: Sequence[Item]) -> None:
+    def upload(self, items: Sequence[PlanItem]) -> None:
         """Replace the mission; continues an upload in progress."""
 
     def request_mission_progress(self) -> None:

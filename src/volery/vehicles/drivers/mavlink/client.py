@@ -30,8 +30,8 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
-from volery.vehicles.firmware_versions import Coverage, MinorVersion, Rule, stated_version
-from volery.vehicles.services import NO_RULES, Item, ParameterRules
+from volery.vehicles.firmware_versions import Coverage, MinorVersion, VersionRule, stated_version
+from volery.vehicles.services import NO_RULES, ParameterRules, PlanItem
 from volery.vehicles.telemetry import Answer, Telemetry
 from volery.vehicles.tried_versions import tried
 
@@ -74,7 +74,7 @@ ACK_KEYS: Mapping[int, str] = {
 }
 
 
-class Firmware(NamedTuple):
+class FirmwareTraits(NamedTuple):
     """What the client needs to know of a firmware.
 
     Args:
@@ -98,7 +98,7 @@ class Firmware(NamedTuple):
     coverage: Coverage
     estimator: str
     turning: int
-    drawn_back: Rule[bool] = MEASURED_HEADING
+    drawn_back: VersionRule[bool] = MEASURED_HEADING
     parameter_rules: ParameterRules = NO_RULES
     bytewise: bool = False
     home_first: bool = False
@@ -191,7 +191,7 @@ class MissionUpload:
         send_to: sends a message, given its name and its fields without the target.
     """
 
-    def __init__(self, items: Sequence[Item], send_to: Callable[..., None]) -> None:
+    def __init__(self, items: Sequence[PlanItem], send_to: Callable[..., None]) -> None:
         self._items = items
         self._send_to = send_to
         self._requested_at: Ns | None = None
@@ -212,7 +212,7 @@ class MissionUpload:
         self._send_to("MISSION_ITEM_INT", **item_fields(self._items[number], number, MISSION_TYPE))
 
 
-def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, Ns]:
+def stream_periods(firmware: FirmwareTraits, options: Mapping[str, str]) -> dict[str, Ns]:
     """Return the requested messages with their periods.
 
     Args:
@@ -248,7 +248,7 @@ class MavlinkClient:
     """
 
     cycle: ClassVar[Action | None] = None
-    firmware: ClassVar[Firmware]
+    firmware: ClassVar[FirmwareTraits]
 
     def __init__(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> None:
         self.telemetry = Telemetry(kernel, name)
@@ -504,7 +504,7 @@ class MavlinkClient:
         """Return nothing: they arrive as texts, which errors quote."""
         return ()
 
-    def upload(self, items: Sequence[Item]) -> None:
+    def upload(self, items: Sequence[PlanItem]) -> None:
         """Upload a mission; a repeated call starts again only if the autopilot requests no more items."""
         if self._upload is None or not self._upload.alive(self._kernel.now()):
             self._upload = MissionUpload(items, self._send_to)

@@ -32,7 +32,7 @@ from volery.vehicles.drivers.steps import (
     ready_step,
     send_nothing,
 )
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.telemetry import UNFIXED, Telemetry
 
 COMPLETE_FOR: Ns = 2500 * MS
@@ -191,7 +191,7 @@ class MavlinkDriver:
     # -- missions
 
     @abstractmethod
-    def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
+    def _items(self, mission: Sequence[MissionItem]) -> list[PlanItem]:
         """Return the mission as items of the firmware."""
 
     @abstractmethod

@@ -16,7 +16,7 @@ from typing import Any
 from volery.base.errors import LinkError, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.ros.graph import Node, Rate, ServiceError
+from volery.ros.graph import LoopRate, Node, ServiceError
 from volery.ros.graph.work import Work
 from volery.vehicles.telemetry import Telemetry
 
@@ -47,7 +47,7 @@ class GraphBackend:
         self._arrived: deque[Work] = deque()
         self._spinner = node.group()
         self._inbox = node.group(self._arrived.append)
-        self._rate: Rate
+        self._rate: LoopRate
 
     def _name(self, name: str) -> str:
         return f"{self._namespace}/{name}"

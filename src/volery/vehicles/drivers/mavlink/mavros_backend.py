@@ -43,8 +43,8 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.graph_backend import PERIOD, GraphBackend
 from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
-from volery.vehicles.firmware_versions import Rule
-from volery.vehicles.services import NO_RULES, Item, ParameterRules
+from volery.vehicles.firmware_versions import VersionRule
+from volery.vehicles.services import NO_RULES, ParameterRules, PlanItem
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
 MAVROS_OPTIONS = ("geoid", "namespace")
@@ -62,7 +62,7 @@ class FirmwareBehind(NamedTuple):
     """Whether item 0 of a mission is home."""
     turning: int
     """Type mask of SET_ATTITUDE_TARGET beside a yaw rate."""
-    drawn_back: Rule[bool] = MEASURED_HEADING
+    drawn_back: VersionRule[bool] = MEASURED_HEADING
     """See ``AttitudeStream``."""
     parameter_rules: ParameterRules = NO_RULES
     """Its parameters with other names in other versions, and those that it writes itself."""
@@ -297,7 +297,7 @@ class MavrosBackend(GraphBackend):
         """Call ``cmd/command`` with RUN_PREARM_CHECKS."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
-    def upload(self, items: Sequence[Item]) -> None:
+    def upload(self, items: Sequence[PlanItem]) -> None:
         """Call ``mission/push``."""
         waypoints = [to_waypoint(item, number == 0) for number, item in enumerate(items)]
         asked = request("mavros_msgs/srv/WaypointPush", start_index=0, waypoints=waypoints)

@@ -29,10 +29,10 @@ from volery.ros.messages import message_class, new, request
 from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.services import (
     NO_RULES,
-    Item,
     LogEntry,
     Parameter,
     ParameterRules,
+    PlanItem,
     mavlink_parameter_name,
     missing_parameter,
 )
@@ -203,10 +203,10 @@ class MavrosServices:
         """Return what MAVROS has pulled, as ROS parameters."""
         if self._is_mavros_1():
             name = f"{self._namespace}/param"
-            found = self._node.get_parameter(name, None)
-            if not isinstance(found, dict) or not found:
+            parameter = self._node.get_parameter(name, None)
+            if not isinstance(parameter, dict) or not parameter:
                 raise NotArrived(self._name, asked, f"there are no ROS parameters {name}")
-            return found
+            return parameter
         kind = "rcl_interfaces/srv/ListParameters"
         names = list(self._call(asked, "param/list_parameters", kind).result.names)
         values = self._ros2_values(asked, names)
@@ -266,9 +266,9 @@ class MavrosServices:
 
     def _is_whole(self, asked: str, name: str) -> bool:
         """Return whether a parameter takes whole numbers; a value of 0 has no type in ``param/get``."""
-        found = self.read_parameter(name)
-        if found.value:
-            return found.type == INT32
+        parameter = self.read_parameter(name)
+        if parameter.value:
+            return parameter.type == INT32
         if not self._pulled:
             self._pull(asked)
         return isinstance(self._pulled_values(asked).get(name), int)
@@ -282,7 +282,7 @@ class MavrosServices:
 
     # -- plans
 
-    def download_items(self, kind: int) -> list[Item]:
+    def download_items(self, kind: int) -> list[PlanItem]:
         """See ``Services``."""
         asked = f"read its {_LISTS[kind]}"
         if kind not in self._lists:
@@ -308,7 +308,7 @@ class MavrosServices:
     def _keep_list(self, kind: int, message: Any) -> None:
         self._lists[kind] = (self._kernel.now(), list(message.waypoints))
 
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+    def upload_items(self, kind: int, items: Sequence[PlanItem]) -> None:
         """See ``Services``."""
         asked = f"store {len(items)} items of its {_LISTS[kind]}"
         if not items:
@@ -360,7 +360,7 @@ class MavrosServices:
             entries = [self._entries[number] for number in sorted(self._entries)]
             if not entries or len(entries) < entries[0].num_logs:
                 return None
-            return [LogEntry(one.id, one.size, _seconds(one.time_utc)) for one in entries]
+            return [LogEntry(entry.id, entry.size, _seconds(entry.time_utc)) for entry in entries]
 
         ask()
         return self._until(asked, whole, ANSWERED_WITHIN, ask)
@@ -387,7 +387,7 @@ class MavrosServices:
         def whole() -> bytes | None:
             if missing() < offset + count:
                 return None
-            return b"".join(self._pieces[place] for place in sorted(self._pieces) if place >= offset)[:count]
+            return b"".join(self._pieces[piece] for piece in sorted(self._pieces) if piece >= offset)[:count]
 
         ask()
         return self._until(asked, whole, PIECE_WITHIN, ask)
@@ -474,7 +474,7 @@ def _seconds(stamp: Any) -> int:
     return int(stamp.sec or stamp.nanosec)
 
 
-def to_waypoint(item: Item, current: bool) -> Any:
+def to_waypoint(item: PlanItem, current: bool) -> Any:
     """Return an item as MAVROS has it."""
     first, second, third, fourth = item.parameters
     return new(
@@ -493,7 +493,7 @@ def to_waypoint(item: Item, current: bool) -> Any:
     )
 
 
-def _item(waypoint: Any) -> Item:
+def _item(waypoint: Any) -> PlanItem:
     parameters = (waypoint.param1, waypoint.param2, waypoint.param3, waypoint.param4)
     place = waypoint.x_lat, waypoint.y_long
-    return Item(waypoint.command, waypoint.frame, parameters, *place, waypoint.z_alt)
+    return PlanItem(waypoint.command, waypoint.frame, parameters, *place, waypoint.z_alt)

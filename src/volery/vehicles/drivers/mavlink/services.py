@@ -34,10 +34,10 @@ from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import (
     MISSION,
     NO_RULES,
-    Item,
     LogEntry,
     Parameter,
     ParameterRules,
+    PlanItem,
     mavlink_parameter_name,
     missing_parameter,
 )
@@ -162,9 +162,9 @@ class MavlinkServices(PendingRequests):
         value = fields["param_value"]
         if self._bytewise:
             value = from_bytewise(fields["param_type"], value)
-        found = Parameter(fields["param_id"], float(value), fields["param_type"])
-        self._known[found.name] = found
-        return found
+        parameter = Parameter(fields["param_id"], float(value), fields["param_type"])
+        self._known[parameter.name] = parameter
+        return parameter
 
     def read_parameter(self, name: str) -> Parameter:
         """See ``Services``."""
@@ -300,7 +300,7 @@ class MavlinkServices(PendingRequests):
 
     # -- plans
 
-    def download_items(self, kind: int) -> list[Item]:
+    def download_items(self, kind: int) -> list[PlanItem]:
         """See ``Services``."""
 
         def counted(frame: Frame) -> int | None:
@@ -316,8 +316,8 @@ class MavlinkServices(PendingRequests):
                 self._send_to("MISSION_ACK", type=0, mission_type=kind)
         return items
 
-    def _download_item(self, asked: str, kind: int, number: int) -> Item:
-        def item(frame: Frame) -> Item | None:
+    def _download_item(self, asked: str, kind: int, number: int) -> PlanItem:
+        def item(frame: Frame) -> PlanItem | None:
             _refuse_list(self._name, frame, kind)
             fields = frame.fields
             if (
@@ -329,13 +329,13 @@ class MavlinkServices(PendingRequests):
             parameters = (fields["param1"], fields["param2"], fields["param3"], fields["param4"])
             scale = item_scale(fields["command"], fields["frame"])
             place = fields["x"] / scale, fields["y"] / scale
-            return Item(fields["command"], fields["frame"], parameters, *place, fields["z"])
+            return PlanItem(fields["command"], fields["frame"], parameters, *place, fields["z"])
 
         return self.ask(
             asked, lambda: self._send_to("MISSION_REQUEST_INT", seq=number, mission_type=kind), item
         )
 
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+    def upload_items(self, kind: int, items: Sequence[PlanItem]) -> None:
         """See ``Services``."""
         asked = f"store {len(items)} items of its {_LISTS[kind]}"
         first = 0 if self.home_first and kind == MISSION else 1
@@ -409,7 +409,7 @@ class MavlinkServices(PendingRequests):
                 parts[fields["ofs"]] = bytes(fields["data"][: fields["count"]])
             if missing() < offset + count:
                 return None
-            return b"".join(parts[place] for place in sorted(parts) if place >= offset)[:count]
+            return b"".join(parts[part] for part in sorted(parts) if part >= offset)[:count]
 
         def send() -> None:
             place = missing()
@@ -570,7 +570,7 @@ def _refusal(frame: Frame, kind: int) -> str:
 _PLACES = {"INVALID_PARAM5_X": 5, "INVALID_PARAM6_Y": 6, "INVALID_PARAM7": 7}
 
 
-def _why_refused(result: str, item: Item, number: int) -> str:
+def _why_refused(result: str, item: PlanItem, number: int) -> str:
     """Return what the autopilot refuses of item *number* of the plan, in words."""
     command = entry_name("MAV_CMD", item.command)
     what = f"item {number}, command {item.command}"
@@ -590,7 +590,7 @@ def _why_refused(result: str, item: Item, number: int) -> str:
     return f"the autopilot answered {result} at {what}"
 
 
-def item_fields(item: Item, number: int, kind: int) -> dict[str, Any]:
+def item_fields(item: PlanItem, number: int, kind: int) -> dict[str, Any]:
     """Return an item as the fields of MISSION_ITEM_INT."""
     first, second, third, fourth = item.parameters
     scale = item_scale(item.command, item.frame)

@@ -14,7 +14,7 @@ from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
 from volery.links.link import Link
-from volery.links.paparazzi_aircraft import PaparazziAircraft, Setting
+from volery.links.paparazzi_aircraft import AircraftSetting, PaparazziAircraft
 from volery.links.pprzlink_codec import (
     TO_GROUND,
 )
@@ -54,7 +54,7 @@ STOP = entry_value("EMERGENCY_CMD", "cmd", "KILL")
 COME_DOWN = entry_value("EMERGENCY_CMD", "cmd", "LAND")
 
 
-class Setpoint(NamedTuple):
+class PprzSetpoint(NamedTuple):
     """A set-point in GUIDED.
 
     North, east and down in metres about the local origin and a heading in radians; with the flags
@@ -98,7 +98,7 @@ class PaparazziBackend:
         self._silent = False
         self._wrong_setting = ""
         self._wrong_answers = 0
-        self._settings: Mapping[str, Setting] = {
+        self._settings: Mapping[str, AircraftSetting] = {
             name: aircraft.setting(name) for name in (AUTO2, KILL_THROTTLE, MODE)
         }
         self._unchecked = {KILL_THROTTLE, MODE}
@@ -200,11 +200,11 @@ class PaparazziBackend:
         if self.decoder.settings_checked:
             self.write_setting(self._settings[name], value)
 
-    def write_setting(self, setting: Setting, value: float) -> None:
+    def write_setting(self, setting: AircraftSetting, value: float) -> None:
         """Write any setting; it is answered by its value."""
         self._send("SETTING", index=setting.number, ac_id=self._system, value=value)
 
-    def request_setting(self, setting: Setting) -> None:
+    def request_setting(self, setting: AircraftSetting) -> None:
         """Request the value of a setting."""
         self._send("GET_SETTING", index=setting.number, ac_id=self._system)
 
@@ -248,7 +248,7 @@ class PaparazziBackend:
         if self.decoder.settings_checked:
             self._send("BLOCK", block_id=self.aircraft.block(name).number, ac_id=self._system)
 
-    def send_setpoint(self, setpoint: Setpoint) -> None:
+    def send_setpoint(self, setpoint: PprzSetpoint) -> None:
         """Send a set-point, which is obeyed in GUIDED only."""
         self._send(
             "GUIDED_SETPOINT_NED",

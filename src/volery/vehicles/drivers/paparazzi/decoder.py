@@ -117,7 +117,7 @@ LOST_FILTERS = frozenset({4, 5, 6, 8})
 """GPS_LOST, IMU_LOST, COV_ERR and ERROR in STATE_FILTER_STATUS."""
 
 
-class Origin:
+class ReportedOrigin:
     """The local frame: east, north, up about the point in INS_REF. Altitudes outside are AMSL."""
 
     def __init__(self, fields: Fields) -> None:
@@ -161,7 +161,7 @@ class PaparazziDecoder:
     def __init__(
         self, kernel: Kernel, telemetry: Telemetry, aircraft: PaparazziAircraft, *, record: bool
     ) -> None:
-        self.origin: Origin | None = None
+        self.origin: ReportedOrigin | None = None
         self.ours: frozenset[str] = frozenset()
         self.settings_checked = False
         self.starting: Ns | None = None
@@ -311,7 +311,7 @@ class PaparazziDecoder:
         latitude, longitude = fields["lat0"], fields["lon0"]
         if not (latitude or longitude) or abs(latitude) > 90 * 10**7 or abs(longitude) > 180 * 10**7:
             return
-        self.origin = Origin(fields)
+        self.origin = ReportedOrigin(fields)
         self._origin_is_set = self.block[1] >= 0 and self.block[1] not in self._preparing
         self._update_home()
         self.update_ready()

@@ -9,7 +9,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import ManualControl, Step
-from volery.vehicles.drivers.paparazzi.backend import BY_VELOCITY, STOP, PaparazziBackend, Setpoint
+from volery.vehicles.drivers.paparazzi.backend import BY_VELOCITY, STOP, PaparazziBackend, PprzSetpoint
 from volery.vehicles.drivers.paparazzi.decoder import CHANGE, GUIDED, START
 from volery.vehicles.drivers.steps import SetpointRepeater, at_rest, immediate_step, send_nothing
 from volery.vehicles.telemetry import Velocity
@@ -21,7 +21,7 @@ STOPS = 4
 SLOWED, NOISE_M_S, TURNED_DEG = 0.5, 0.1, 2.0
 """Share of a slow velocity, error of the estimate, and turn within 1 s, at which it has stopped."""
 
-STILL = Setpoint(0.0, 0.0, 0.0, 0.0, BY_VELOCITY)
+STILL = PprzSetpoint(0.0, 0.0, 0.0, 0.0, BY_VELOCITY)
 
 CHANGED_WITHIN: Ns = 8 * S
 """Time-out of mode changes and motors. ROTORCRAFT_STATUS arrives each 1.2 s where nothing changes."""
@@ -80,7 +80,7 @@ class PaparazziSetpoints(SetpointRepeater):
             self.send_stop()
             return
         north, east, up = velocity
-        self._backend.send_setpoint(Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
+        self._backend.send_setpoint(PprzSetpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
 
     def is_commanded(self, mode: str) -> bool:
         """Return whether *mode* is one of ours."""
@@ -210,9 +210,9 @@ class PaparazziSteps:
         assert here is not None, "a position that counts was received"
         return self._ned(here)[:2]
 
-    def at(self, goal: Position) -> Setpoint:
+    def at(self, goal: Position) -> PprzSetpoint:
         """Return the set-point of *goal* with the commanded heading."""
-        return Setpoint(*self._ned(goal), self.heading())
+        return PprzSetpoint(*self._ned(goal), self.heading())
 
     def stay(self) -> None:
         """Send the present position as set-point, if it counts."""

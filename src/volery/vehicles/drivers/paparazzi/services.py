@@ -13,7 +13,7 @@ from math import isclose, nan
 from volery.base.errors import NotArrived, Refused
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Kernel
-from volery.links.paparazzi_aircraft import Setting
+from volery.links.paparazzi_aircraft import AircraftSetting
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import AUTO2, KILL_THROTTLE, MODE
 from volery.vehicles.services import Parameter, PartialServices
@@ -45,14 +45,16 @@ class PaparazziServices(PartialServices):
         """See ``Services``."""
         return self._backend.aircraft.setting(name).name
 
-    def _values_since(self, asked: str, settings: Sequence[Setting], send: Action) -> dict[str, Parameter]:
+    def _values_since(
+        self, asked: str, settings: Sequence[AircraftSetting], send: Action
+    ) -> dict[str, Parameter]:
         """Call *send* until a value of each setting has arrived since then; return the values."""
         decoder, changed = self._backend.decoder, self._backend.telemetry.changed
         began = self._kernel.now()
 
         def missing() -> list[str]:
             known = decoder.values
-            return [one.name for one in settings if known.get(one.number, (-1, 0.0))[0] < began]
+            return [setting.name for setting in settings if known.get(setting.number, (-1, 0.0))[0] < began]
 
         with self._kernel.joined():
             for _ in range(TRIES):
@@ -60,8 +62,8 @@ class PaparazziServices(PartialServices):
                     send()
                 if changed.wait_for(lambda: not missing(), AGAIN, ends_activation=True):
                     return {
-                        one.name: Parameter(one.name, decoder.values[one.number][1], REAL32)
-                        for one in settings
+                        setting.name: Parameter(setting.name, decoder.values[setting.number][1], REAL32)
+                        for setting in settings
                     }
         raise NotArrived(self._name, asked, f"no value of {', '.join(missing())} arrived")
 
@@ -80,7 +82,7 @@ class PaparazziServices(PartialServices):
         for first in range(0, len(settings), AT_ONCE):
             some = settings[first : first + AT_ONCE]
 
-            def send(some: Sequence[Setting] = some) -> None:
+            def send(some: Sequence[AircraftSetting] = some) -> None:
                 for one in some:
                     self._backend.request_setting(one)
 

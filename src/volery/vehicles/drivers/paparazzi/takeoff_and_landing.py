@@ -14,7 +14,7 @@ from math import hypot, isnan
 from volery.base.errors import Refused
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.vehicles.driver import ManualControl, Repeat, Step
-from volery.vehicles.drivers.paparazzi.backend import COME_DOWN, VELOCITY_Z, Setpoint
+from volery.vehicles.drivers.paparazzi.backend import COME_DOWN, VELOCITY_Z, PprzSetpoint
 from volery.vehicles.drivers.paparazzi.decoder import (
     ATTITUDE_MODE,
     FAILSAFE,
@@ -167,7 +167,7 @@ class TakeoffAndLanding:
         note_spot = immediate_step("note where it stands", lambda: spot.append(steps.spot()))
 
         def send() -> None:
-            self._backend.send_setpoint(Setpoint(*spot[-1], -height, steps.heading()))
+            self._backend.send_setpoint(PprzSetpoint(*spot[-1], -height, steps.heading()))
 
         straight_up = Step(
             ask=f"climb to {height:g} m",
@@ -359,7 +359,7 @@ class TakeoffAndLanding:
         def send() -> None:
             if not spot:
                 spot.append(steps.spot())
-            self._backend.send_setpoint(Setpoint(*spot[0], SINKING_M_S, steps.heading(), VELOCITY_Z))
+            self._backend.send_setpoint(PprzSetpoint(*spot[0], SINKING_M_S, steps.heading(), VELOCITY_Z))
 
         descend = Step(
             ask="descend",

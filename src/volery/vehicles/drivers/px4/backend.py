@@ -20,7 +20,7 @@ from volery.vehicles.drivers.mavlink.backend import (
     Backend,
     acceleration_fields,
 )
-from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
+from volery.vehicles.drivers.mavlink.client import FirmwareTraits, MavlinkClient
 from volery.vehicles.drivers.mavlink.services import MavlinkServices
 from volery.vehicles.drivers.px4.decoder import PX4Decoder
 from volery.vehicles.drivers.px4.events import (
@@ -35,7 +35,7 @@ from volery.vehicles.drivers.px4.versions import COVERAGE, PARAMETER_RULES
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Velocity
 
-PX4_FIRMWARE = Firmware(
+PX4_FIRMWARE = FirmwareTraits(
     number=constant("MAV_AUTOPILOT_PX4"),
     name="PX4",
     called="a PX4",
@@ -55,7 +55,7 @@ _NO_SPEED = -1.0
 """In DO_REPOSITION: speed unchanged."""
 
 
-class Setpoint(NamedTuple):
+class OffboardSetpoint(NamedTuple):
     """A set-point of OFFBOARD: velocity, and yaw rate in degrees/s.
 
     An acceleration, where given, takes the place of the velocity.
@@ -107,7 +107,7 @@ class PX4Backend(Backend, Protocol):
     def reposition(self, goal: Position, heading: float | None) -> None:
         """Enter AUTO.LOITER and go to *goal*, whose altitude is AMSL; *heading* in degrees."""
 
-    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+    def send_setpoint(self, setpoint: OffboardSetpoint | AttitudeTarget) -> None:
         """Send one set-point of the stream that OFFBOARD needs."""
 
     def send_manual_control(self, control: ManualControl) -> None:
@@ -193,7 +193,7 @@ class PX4Mavlink(MavlinkClient):
         """Send DO_REPOSITION."""
         self._send_to("COMMAND_INT", **reposition_fields(goal, heading))
 
-    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+    def send_setpoint(self, setpoint: OffboardSetpoint | AttitudeTarget) -> None:
         """Send SET_ATTITUDE_TARGET, or SET_POSITION_TARGET_LOCAL_NED in frame 1; PX4 accepts only 1 and 8."""
         if isinstance(setpoint, AttitudeTarget):
             self.send_attitude(setpoint)

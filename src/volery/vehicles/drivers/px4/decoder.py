@@ -13,8 +13,8 @@ from volery.vehicles.drivers.px4.events import (
     KNOWN_EVENTS,
     REPORT_ENDS,
     WITHOUT_TEXT,
-    ArmingChecks,
     EventTexts,
+    FailingChecks,
     event_of,
 )
 from volery.vehicles.drivers.px4.modes import HOLD, mode_name
@@ -53,7 +53,7 @@ class PX4Decoder(TelemetryDecoder):
         on_unknown: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(kernel, telemetry, record=record)
-        self._checks = ArmingChecks()
+        self._checks = FailingChecks()
         self._request = request  # requests events by their first and last sequence number
         self._on_unknown = on_unknown  # an event has arrived that has no text
         self._sequence: int | None = None  # of the newest event that was received or requested

@@ -53,7 +53,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
-from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
+from volery.vehicles.drivers.px4.backend import OffboardSetpoint, PX4Backend
 from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD, link_loss_settings, on_link_loss
 from volery.vehicles.drivers.px4.setpoints import SETPOINT_PERIOD, STILL, ManualControlStream, OffboardStream
 from volery.vehicles.drivers.steps import (
@@ -72,7 +72,7 @@ from volery.vehicles.drivers.steps import (
     mode_step,
     send_nothing,
 )
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 TAKEOFF_SHORT_M = 1.5
@@ -299,7 +299,7 @@ class PX4(MavlinkDriver):
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Stream a velocity in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
-        return self._streamed(Setpoint(velocity, yaw_rate), lasting)
+        return self._streamed(OffboardSetpoint(velocity, yaw_rate), lasting)
 
     def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Stream an acceleration in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
@@ -321,7 +321,7 @@ class PX4(MavlinkDriver):
             self._reposition_step(f"turn to {degrees:g} degrees", lambda: here, TURNED_WITHIN, degrees),
         )
 
-    def _streamed(self, setpoint: Setpoint | AttitudeTarget, lasting: Ns | None) -> Sequence[Step]:
+    def _streamed(self, setpoint: OffboardSetpoint | AttitudeTarget, lasting: Ns | None) -> Sequence[Step]:
         """Start the stream, without which PX4 does not enter OFFBOARD; leave a failsafe by way of Hold."""
         seen = self.telemetry
         in_failsafe = seen.failsafe and seen.mode not in {HOLD, OFFBOARD}
@@ -440,7 +440,7 @@ class PX4(MavlinkDriver):
 
     # -- missions
 
-    def _items(self, mission: Sequence[MissionItem]) -> list[Item]:
+    def _items(self, mission: Sequence[MissionItem]) -> list[PlanItem]:
         return mission_items(mission, self._here("upload a mission"))
 
     def _end_in_air(self, mission: Sequence[MissionItem]) -> int | None:
@@ -495,7 +495,7 @@ class PX4(MavlinkDriver):
         return (*centre, entered, disarmed_step(ask, mode, within))
 
 
-def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:
+def mission_items(mission: Sequence[MissionItem], here: Position) -> list[PlanItem]:
     """Return the mission as PX4's items, without one for home; items without a place use the mission frame.
 
     As recorded, PX4 1.14 refuses commands without a place in a global frame, and flies to latitude and
@@ -505,7 +505,7 @@ def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:
         mission: items of the mission.
         here: position at its start.
     """
-    items: list[Item] = []
+    items: list[PlanItem] = []
     at = here
     for one in mission:
         items.append(_wire_item(one, at))
@@ -513,7 +513,7 @@ def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:
     return items
 
 
-def _wire_item(one: MissionItem, at: Position) -> Item:
+def _wire_item(one: MissionItem, at: Position) -> PlanItem:
     if isinstance(one, TakeOff):
         up = Position(at.latitude, at.longitude, AboveHome(one.height))
         return mission_item("MAV_CMD_NAV_TAKEOFF", 0.0, 0.0, 0.0, nan, at=up)

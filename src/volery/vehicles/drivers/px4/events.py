@@ -376,7 +376,7 @@ WITHOUT_TEXT = frozenset(
 # -- one event
 
 
-class Event(NamedTuple):
+class ReportedEvent(NamedTuple):
     """An event. Of an arming check, ``modes`` has a bit for the ``state`` of each mode that it forbids."""
 
     id: int
@@ -385,11 +385,11 @@ class Event(NamedTuple):
     arguments: bytes = b""
 
 
-def event_of(fields: Mapping[str, Any]) -> Event:
+def event_of(fields: Mapping[str, Any]) -> ReportedEvent:
     """Return the event of an EVENT message; the low four bits of ``log_levels`` are its external severity."""
     arguments = bytes(fields["arguments"])
     modes = int.from_bytes(arguments[:4], "little")
-    return Event(fields["id"], fields["log_levels"] & 0x0F, modes, arguments)
+    return ReportedEvent(fields["id"], fields["log_levels"] & 0x0F, modes, arguments)
 
 
 # -- texts of the vehicle
@@ -415,7 +415,7 @@ _PLACE = re.compile(r"(?<!\\)\{(\d+)(?::\.(\d+))?:?([^}]*)\}")
 _TAG = re.compile(r"(?<!\\)</?[a-z][^>]*>")
 
 
-class _Argument(NamedTuple):
+class _EventArgument(NamedTuple):
     number: struct.Struct
     entries: Mapping[str, str]
     """Words by value, of an enumeration."""
@@ -432,10 +432,10 @@ class EventTexts:
     """
 
     def __init__(self, document: bytes) -> None:
-        self._messages: dict[int, tuple[str, Sequence[_Argument]]] = {}
+        self._messages: dict[int, tuple[str, Sequence[_EventArgument]]] = {}
         try:
             components = json.loads(document)["components"]
-            enumerations: dict[str, _Argument] = {}
+            enumerations: dict[str, _EventArgument] = {}
             for one in components.values():
                 enumerations |= _enumerations(one)
             for number, one in components.items():
@@ -449,17 +449,17 @@ class EventTexts:
         except (KeyError, TypeError, AttributeError, UnicodeDecodeError, RecursionError) as error:
             raise ValueError(f"no file of events: {error}") from None
 
-    def text(self, event: Event) -> str:
+    def text(self, event: ReportedEvent) -> str:
         """Return the text of an event; empty if the vehicle states none."""
         message, arguments = self._messages.get(event.id, ("", ()))
         values: list[Any] = []
         at = 0
-        for one in arguments:
-            if at + one.number.size > len(event.arguments):
+        for argument in arguments:
+            if at + argument.number.size > len(event.arguments):
                 break
-            (value,) = one.number.unpack_from(event.arguments, at)
-            at += one.number.size
-            values.append(one.entries.get(str(value), value))
+            (value,) = argument.number.unpack_from(event.arguments, at)
+            at += argument.number.size
+            values.append(argument.entries.get(str(value), value))
 
         def filled(place: re.Match[str]) -> str:
             index, digits, unit = place.groups()
@@ -478,19 +478,19 @@ class EventTexts:
         return re.sub(r"\\([<>{}\\])", r"\1", text).strip()
 
 
-def _enumerations(component: Mapping[str, Any]) -> dict[str, _Argument]:
+def _enumerations(component: Mapping[str, Any]) -> dict[str, _EventArgument]:
     found = {}
     for name, one in component.get("enums", {}).items():
         entries = {value: str(entry.get("description", "")) for value, entry in one["entries"].items()}
         number = _NUMBERS.get(str(one["type"]), _NUMBERS["uint8_t"])
-        found[str(name)] = _Argument(number, {} if one.get("is_bitfield") else entries)
+        found[str(name)] = _EventArgument(number, {} if one.get("is_bitfield") else entries)
     return found
 
 
-def _argument(kind: str, enumerations: Mapping[str, _Argument]) -> _Argument:
+def _argument(kind: str, enumerations: Mapping[str, _EventArgument]) -> _EventArgument:
     number = _NUMBERS.get(kind)
     if number is not None:
-        return _Argument(number, {})
+        return _EventArgument(number, {})
     return enumerations[kind.rsplit("::", 1)[-1]]
 
 
@@ -502,9 +502,9 @@ def path_of_events(general: bytes) -> str:
     """
     try:
         kinds = json.loads(general)["metadataTypes"]
-        for one in kinds:
-            if one["type"] == EVENTS_METADATA:
-                return path_on_board(str(one["uri"]))
+        for kind in kinds:
+            if kind["type"] == EVENTS_METADATA:
+                return path_on_board(str(kind["uri"]))
     except (ValueError, KeyError, TypeError, RecursionError):
         pass
     return ""
@@ -538,18 +538,18 @@ def uncompressed(path: str, data: bytes) -> bytes:
 # -- arming checks
 
 
-class ArmingChecks:
+class FailingChecks:
     """The arming checks that fail now, collected from reports."""
 
     def __init__(self) -> None:
         self.reported = False
         self.texts: EventTexts | None = None
         """Texts of the vehicle, once they are known."""
-        self._failing: tuple[Event, ...] = ()
-        self._report: list[Event] | None = None
+        self._failing: tuple[ReportedEvent, ...] = ()
+        self._report: list[ReportedEvent] | None = None
         self._can_arm = self._reported_can_arm = 0
 
-    def handle_event(self, event: Event) -> bool:
+    def handle_event(self, event: ReportedEvent) -> bool:
         """Process an event; return whether it belongs to a report."""
         if event.id == REPORT_BEGINS:
             self._report = []
@@ -568,12 +568,12 @@ class ArmingChecks:
             self._report.append(event)
         return True
 
-    def knows(self, event: Event) -> bool:
+    def knows(self, event: ReportedEvent) -> bool:
         """Return whether an event has a text, or is only of use to programs."""
         known = event.id in CHECKS or event.id in KNOWN_EVENTS or event.id in (REPORT_BEGINS, REPORT_ENDS)
         return known or event.severity > WARNING or (self.texts is not None and bool(self.texts.text(event)))
 
-    def text(self, event: Event) -> str:
+    def text(self, event: ReportedEvent) -> str:
         """Return the text of an event: the vehicle's own, else the built-in one, else its number."""
         stated = self.texts.text(event) if self.texts is not None else ""
         return stated or event_text(event.id)
@@ -590,7 +590,7 @@ class ArmingChecks:
         """Return the reasons that waiting does not mend."""
         return [self.text(event) for event in self._forbidding(mode) if event.id in LASTING_CHECKS]
 
-    def _forbidding(self, mode: str) -> list[Event]:
+    def _forbidding(self, mode: str) -> list[ReportedEvent]:
         if mode in MODES and self._can_arm >> MODES[mode].state & 1:
             return []
         found = [event for event in self._failing if _forbids(event, mode)]
@@ -604,7 +604,7 @@ def event_text(number: int) -> str:
     return CHECKS.get(number) or KNOWN_EVENTS.get(number) or f"event {number:#010x}"
 
 
-def _forbids(event: Event, mode: str) -> bool:
+def _forbids(event: ReportedEvent, mode: str) -> bool:
     """Return whether an event forbids arming in *mode*; missing manual control forbids manual modes."""
     if event.id == NO_MANUAL_CONTROL:
         return mode in MANUAL_MODES

@@ -23,7 +23,7 @@ from volery.vehicles.drivers.mavlink.mavros_backend import (
     MavrosBackend,
     namespace_and_geoid,
 )
-from volery.vehicles.drivers.px4.backend import Setpoint, manual_control_axes, reposition_fields
+from volery.vehicles.drivers.px4.backend import OffboardSetpoint, manual_control_axes, reposition_fields
 from volery.vehicles.drivers.px4.driver import PX4
 from volery.vehicles.drivers.px4.modes import HOLD
 from volery.vehicles.drivers.px4.versions import PARAMETER_RULES
@@ -62,7 +62,7 @@ class PX4Mavros(MavrosBackend):
         asked = request("mavros_msgs/srv/CommandInt", **reposition_fields(goal, heading))
         self._call(self._command_int, asked)
 
-    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+    def send_setpoint(self, setpoint: OffboardSetpoint | AttitudeTarget) -> None:
         """Publish on ``setpoint_raw/attitude`` or ``setpoint_raw/local``."""
         if isinstance(setpoint, AttitudeTarget):
             self.send_attitude(setpoint)

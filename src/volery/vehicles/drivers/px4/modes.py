@@ -18,7 +18,7 @@ OFFBOARD = "OFFBOARD"
 HOLD, TAKEOFF, LAND, RTL, MISSION = "AUTO.LOITER", "AUTO.TAKEOFF", "AUTO.LAND", "AUTO.RTL", "AUTO.MISSION"
 
 
-class Mode(NamedTuple):
+class Px4Mode(NamedTuple):
     """A mode. ``state`` is its number in arming checks (``nav_state`` of ``VehicleStatus.msg``)."""
 
     main: int
@@ -31,28 +31,30 @@ class Mode(NamedTuple):
         return self.sub << 24 | self.main << 16
 
 
-MODES: Mapping[str, Mode] = {
-    MANUAL: Mode(1, 0, 0),
-    ALTCTL: Mode(2, 0, 1),
-    POSCTL: Mode(3, 0, 2),
-    "POSCTL.ORBIT": Mode(3, 1, 21),
-    "POSCTL.SLOW": Mode(3, 2, 6),  # since 1.15
-    "AUTO.READY": Mode(4, 1, 4),
-    TAKEOFF: Mode(4, 2, 17),
-    HOLD: Mode(4, 3, 4),
-    MISSION: Mode(4, 4, 3),
-    RTL: Mode(4, 5, 5),
-    LAND: Mode(4, 6, 18),
-    "AUTO.FOLLOW_TARGET": Mode(4, 8, 19),
-    "AUTO.PRECLAND": Mode(4, 9, 20),
-    "AUTO.VTOL_TAKEOFF": Mode(4, 10, 22),
-    **{f"AUTO.EXTERNAL{number}": Mode(4, 10 + number, 22 + number) for number in range(1, 9)},  # since 1.15
-    ACRO: Mode(5, 0, 10),
-    OFFBOARD: Mode(6, 0, 14),
-    STABILIZED: Mode(7, 0, 15),
-    "RATTITUDE": Mode(8, 0, 16),
-    "TERMINATION": Mode(10, 0, 13),  # since 1.15; before, it is reported as MANUAL
-    "ALTITUDE_CRUISE": Mode(11, 0, 8),  # since 1.17
+MODES: Mapping[str, Px4Mode] = {
+    MANUAL: Px4Mode(1, 0, 0),
+    ALTCTL: Px4Mode(2, 0, 1),
+    POSCTL: Px4Mode(3, 0, 2),
+    "POSCTL.ORBIT": Px4Mode(3, 1, 21),
+    "POSCTL.SLOW": Px4Mode(3, 2, 6),  # since 1.15
+    "AUTO.READY": Px4Mode(4, 1, 4),
+    TAKEOFF: Px4Mode(4, 2, 17),
+    HOLD: Px4Mode(4, 3, 4),
+    MISSION: Px4Mode(4, 4, 3),
+    RTL: Px4Mode(4, 5, 5),
+    LAND: Px4Mode(4, 6, 18),
+    "AUTO.FOLLOW_TARGET": Px4Mode(4, 8, 19),
+    "AUTO.PRECLAND": Px4Mode(4, 9, 20),
+    "AUTO.VTOL_TAKEOFF": Px4Mode(4, 10, 22),
+    **{
+        f"AUTO.EXTERNAL{number}": Px4Mode(4, 10 + number, 22 + number) for number in range(1, 9)
+    },  # since 1.15
+    ACRO: Px4Mode(5, 0, 10),
+    OFFBOARD: Px4Mode(6, 0, 14),
+    STABILIZED: Px4Mode(7, 0, 15),
+    "RATTITUDE": Px4Mode(8, 0, 16),
+    "TERMINATION": Px4Mode(10, 0, 13),  # since 1.15; before, it is reported as MANUAL
+    "ALTITUDE_CRUISE": Px4Mode(11, 0, 8),  # since 1.17
 }
 """Modes by name. No number has two meanings in any version."""
 

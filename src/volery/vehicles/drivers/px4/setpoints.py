@@ -10,7 +10,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Handle, Kernel
 from volery.vehicles.driver import AttitudeTarget, ManualControl
 from volery.vehicles.drivers.mavlink.backend import Ack
-from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
+from volery.vehicles.drivers.px4.backend import OffboardSetpoint, PX4Backend
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, OFFBOARD
 from volery.vehicles.drivers.steps import ROVER_KIND, Takeover
 from volery.vehicles.telemetry import Velocity
@@ -29,7 +29,7 @@ SETTLED: Ns = 1 * S
 its own clock: after 0.5 s a PX4 1.14 that lagged behind left AUTO.LAND for POSCTL.
 """
 
-STILL = Setpoint(Velocity(0.0, 0.0, 0.0))
+STILL = OffboardSetpoint(Velocity(0.0, 0.0, 0.0))
 CENTRED = ManualControl()
 _ROVER_CENTRED = ManualControl(throttle=0.0)
 
@@ -48,7 +48,7 @@ class OffboardStream:
         self._backend = backend
         self._takeover = takeover
         self._telemetry = backend.telemetry
-        self._setpoint: Setpoint | AttitudeTarget = STILL
+        self._setpoint: OffboardSetpoint | AttitudeTarget = STILL
         self._lasting: Ns | None = None
         self._began_at = self._telemetry.moment()
         self._began: Ns = 0
@@ -94,7 +94,7 @@ class OffboardStream:
         """Note that OFFBOARD is being commanded."""
         self._commanded_at = self._kernel.now()
 
-    def begin(self, setpoint: Setpoint | AttitudeTarget, lasting: Ns | None = None) -> None:
+    def begin(self, setpoint: OffboardSetpoint | AttitudeTarget, lasting: Ns | None = None) -> None:
         """Stream *setpoint*; after *lasting* enter AUTO.LOITER."""
         now = self._kernel.now()
         self._setpoint = setpoint

@@ -35,11 +35,11 @@ from volery.vehicles.drivers.mavlink.backend import (
     AttitudeStream,
 )
 from volery.vehicles.drivers.mavlink.graph_backend import PERIOD, GraphBackend
-from volery.vehicles.drivers.px4.backend import Setpoint
+from volery.vehicles.drivers.px4.backend import OffboardSetpoint
 from volery.vehicles.drivers.px4.driver import PX4
 from volery.vehicles.drivers.px4.modes import HOLD, MODES
 from volery.vehicles.drivers.steps import ROVER_KIND
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.telemetry import Answer, Attitude, Battery, Velocity
 
 UNACKNOWLEDGED = "1.14"
@@ -230,7 +230,7 @@ class PX4Topics(GraphBackend):
         """Send DO_CHANGE_SPEED."""
         self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, speed, UNCHANGED)
 
-    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+    def send_setpoint(self, setpoint: OffboardSetpoint | AttitudeTarget) -> None:
         """Publish the mode of OFFBOARD and a set-point of it."""
         if isinstance(setpoint, AttitudeTarget):
             self.send_attitude(setpoint)
@@ -259,7 +259,7 @@ class PX4Topics(GraphBackend):
         throttle = control.throttle if self.telemetry.kind == ROVER_KIND else 2.0 * control.throttle - 1.0
         self._publish(self._sticks, valid=True, data_source=_STICKS_OF_A_LINK, throttle=throttle, **axes)
 
-    def upload(self, items: Sequence[Item]) -> None:
+    def upload(self, items: Sequence[PlanItem]) -> None:
         """Refuse: missions do not pass these topics."""
         raise CapabilityError(f"{self.telemetry.name}: missions do not pass PX4's topics; connect by MAVLink")
 

@@ -6,7 +6,7 @@ The rules were read in the sources of v1.13.0 to v1.17.0 and of the branch relea
 from __future__ import annotations
 
 from volery.links.mavlink_messages import constant
-from volery.vehicles.firmware_versions import Coverage, Meaning, Rule
+from volery.vehicles.firmware_versions import Coverage, Meaning, VersionRule
 from volery.vehicles.services import ParameterRules
 
 COVERAGE = Coverage("PX4", (1, 13), (1, 18))
@@ -16,7 +16,7 @@ PARAMETER_RULES = ParameterRules(
 )
 """It writes these itself: volatile in its metadata and no calibration, and the checksum over all."""
 
-NO_HORIZONTAL_POSITION: Rule[int] = Rule(
+NO_HORIZONTAL_POSITION: VersionRule[int] = VersionRule(
     "flags of ESTIMATOR_STATUS with which there is no horizontal position",
     Meaning(
         (1, 13),
@@ -30,7 +30,7 @@ NO_HORIZONTAL_POSITION: Rule[int] = Rule(
     ),
 )
 
-HOME_ALTITUDE_CORRECTED: Rule[bool] = Rule(
+HOME_ALTITUDE_CORRECTED: VersionRule[bool] = VersionRule(
     "whether home's altitude is corrected in the air, for 120 s after a take-off",
     Meaning((1, 13), False, "commander/HomePosition.cpp, update: home stays where it was set"),
     Meaning(

@@ -10,18 +10,18 @@ from hypothesis import assume, given
 from hypothesis import strategies as some
 
 from volery.simulation.autopilots.ardupilot.avoidance import (
-    Law,
+    StoppingLaw,
     _to_crossing,
     _within_circle,
     _within_edges,
     avoidance_of,
 )
 from volery.simulation.autopilots.ardupilot.fence import fence_of
-from volery.simulation.autopilots.ardupilot.fence_shapes import Circle, Polygon
+from volery.simulation.autopilots.ardupilot.fence_shapes import FenceCircle, FencePolygon
 
-SLIDE, STOP, ROVER = Law(1.0, 1.0, False), Law(1.0, 1.0, True), Law(0.0, 0.5, True)
-LAWS = (SLIDE, STOP, ROVER, Law(0.0, 0.5, False))
-SQUARE = Polygon(((-20.0, -20.0), (-20.0, 20.0), (20.0, 20.0), (20.0, -20.0)), inside=True)
+SLIDE, STOP, ROVER = StoppingLaw(1.0, 1.0, False), StoppingLaw(1.0, 1.0, True), StoppingLaw(0.0, 0.5, True)
+LAWS = (SLIDE, STOP, ROVER, StoppingLaw(0.0, 0.5, False))
+SQUARE = FencePolygon(((-20.0, -20.0), (-20.0, 20.0), (20.0, 20.0), (20.0, -20.0)), inside=True)
 MARGIN = 2.0
 ARM, SET_MODE, TAKEOFF, LOITER, GUIDED, ALT_HOLD, ACRO = 400, 176, 22, 5, 4, 2, 1
 AUXILIARY = 218
@@ -30,7 +30,9 @@ velocities = some.tuples(some.floats(-12.0, 12.0), some.floats(-12.0, 12.0))
 places = some.tuples(some.floats(-17.9, 17.9), some.floats(-17.9, 17.9))
 
 
-def flown(law: Law, place: tuple[float, float], velocity: tuple[float, float], limited: Any) -> list[Any]:
+def flown(
+    law: StoppingLaw, place: tuple[float, float], velocity: tuple[float, float], limited: Any
+) -> list[Any]:
     """Return the places of 30 s of flight with a velocity as limited, ten times a second."""
     passed = [place]
     for _ in range(300):
@@ -41,9 +43,9 @@ def flown(law: Law, place: tuple[float, float], velocity: tuple[float, float], l
 
 @given(places, velocities, some.sampled_from(LAWS))
 def test_no_velocity_leaves_a_polygon(
-    place: tuple[float, float], velocity: tuple[float, float], law: Law
+    place: tuple[float, float], velocity: tuple[float, float], law: StoppingLaw
 ) -> None:
-    def limited(wanted: Any, here: Any, law: Law) -> Any:
+    def limited(wanted: Any, here: Any, law: StoppingLaw) -> Any:
         return _within_edges(wanted, here, SQUARE.edges(), MARGIN, law)
 
     most = 20.0 if law.stops else 18.3  # a shortened velocity keeps the margin along its path
@@ -53,13 +55,13 @@ def test_no_velocity_leaves_a_polygon(
 
 @given(places, velocities, some.sampled_from(LAWS), some.booleans())
 def test_no_velocity_crosses_a_circle(
-    place: tuple[float, float], velocity: tuple[float, float], law: Law, inside: bool
+    place: tuple[float, float], velocity: tuple[float, float], law: StoppingLaw, inside: bool
 ) -> None:
-    circle = Circle((1.0, -2.0), 14.0 if inside else 6.0, inside)
+    circle = FenceCircle((1.0, -2.0), 14.0 if inside else 6.0, inside)
     away = hypot(place[0] - 1.0, place[1] + 2.0)
     assume(away <= 12.0 if inside else away >= 8.0 and not law.stops)
 
-    def limited(wanted: Any, here: Any, law: Law) -> Any:
+    def limited(wanted: Any, here: Any, law: StoppingLaw) -> Any:
         return _within_circle(wanted, here, circle, MARGIN, law)
 
     for north, east in flown(law, place, velocity, limited):
@@ -80,10 +82,10 @@ def test_a_shortened_velocity_keeps_its_direction() -> None:
 
 
 @given(velocities, some.sampled_from(LAWS))
-def test_a_velocity_far_from_all_limits_is_unchanged(velocity: tuple[float, float], law: Law) -> None:
+def test_a_velocity_far_from_all_limits_is_unchanged(velocity: tuple[float, float], law: StoppingLaw) -> None:
     wide = [((x * 50.0, y * 50.0), (z * 50.0, w * 50.0)) for (x, y), (z, w) in SQUARE.edges()]
     assert _within_edges(velocity, (0.0, 0.0), wide, MARGIN, law) == velocity
-    assert _within_circle(velocity, (0.0, 0.0), Circle((0.0, 0.0), 900.0, True), MARGIN, law) == velocity
+    assert _within_circle(velocity, (0.0, 0.0), FenceCircle((0.0, 0.0), 900.0, True), MARGIN, law) == velocity
 
 
 def test_the_distance_of_a_crossing() -> None:
@@ -94,7 +96,7 @@ def test_the_distance_of_a_crossing() -> None:
 
 
 @given(some.floats(0.1, 20.0), some.sampled_from(LAWS))
-def test_the_stopping_distance_is_that_of_the_law(speed: float, law: Law) -> None:
+def test_the_stopping_distance_is_that_of_the_law(speed: float, law: StoppingLaw) -> None:
     assert law.speed(law.stopping_distance(speed)) == pytest.approx(speed)
 
 

@@ -13,7 +13,13 @@ from volery.base.errors import UsageError
 from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.ardupilot.copter import arming_problems
-from volery.simulation.autopilots.ardupilot.feature import Build, Check, Feature, Item, Kept
+from volery.simulation.autopilots.ardupilot.feature import (
+    ArmingCheck,
+    Feature,
+    FeatureSet,
+    Kept,
+    MissionCommand,
+)
 from volery.simulation.autopilots.ardupilot.features import OPTIONAL, ORDER, absent, features_of
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.vehicles.address import parse
@@ -108,14 +114,14 @@ def test_features_act_in_the_order_of_the_list(station: Any) -> None:
         return Feature(
             messages={"PING": lambda _vehicle, _fields, _sender: said.append(f"{name} heard")},
             on_tick=lambda _vehicle: said.append(f"{name} ticked"),
-            checks=(Check(f"{name} fails", lambda _vehicle: True),),
-            items={1: Item(name)},
+            checks=(ArmingCheck(f"{name} fails", lambda _vehicle: True),),
+            items={1: MissionCommand(name)},
             telemetry={"A": lambda _vehicle: {"by": "a"}} if name == "a" else {},
             amends={"A": lambda _vehicle, fields: {"by": fields["by"] + name}},
             extends={"A": lambda _vehicle: [{"by": name}]},
         )
 
-    build = Build([feature("a"), feature("b")], arming_problems, ("armed", "disarmed"))
+    build = FeatureSet([feature("a"), feature("b")], arming_problems, ("armed", "disarmed"))
     vehicle = station().vehicle
     build.messages["PING"](vehicle, {}, 1)
     for work in build.ticks:

@@ -8,7 +8,7 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 
 HERE = LocalFrame(-35.363261, 149.165230, 584.0)
 READ_PERIOD = 50 * MS
@@ -65,7 +65,7 @@ def drone():
 
 @pytest.fixture
 def rover():
-    return lambda sensors="consumer", seed=1, **spec: Flown(Rover(sensors=sensors, **spec), seed)
+    return lambda sensors="consumer", seed=1, **spec: Flown(WheeledRover(sensors=sensors, **spec), seed)
 
 
 @pytest.fixture(scope="session")

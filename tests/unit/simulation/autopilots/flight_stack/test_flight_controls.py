@@ -8,7 +8,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.world.body_specs import Battery
+from volery.simulation.world.body_specs import BatteryPack
 from volery.simulation.world.environment_models import Wind
 
 
@@ -26,7 +26,7 @@ def test_off_stops_the_motors_and_idle_turns_them(drone):
 
 
 def test_position_control_holds_to_a_nanometre_without_noise(drone):
-    ideal = Battery(capacity_ah=1e12, resistance_ohm=1e-18)
+    ideal = BatteryPack(capacity_ah=1e12, resistance_ohm=1e-18)
     flown = drone("perfect", battery=ideal).hover()
     flown.wait(240)
     before = flown.flight.truth().position

@@ -10,7 +10,7 @@ from volery.base.frames import LocalFrame, quaternion_to_euler
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.world.body_specs import FRAMES, Multirotor, Rover, frame_rotors
+from volery.simulation.world.body_specs import FRAMES, Multirotor, WheeledRover, frame_rotors
 
 HERE = LocalFrame(-35.363261, 149.165230, 584.0)
 
@@ -73,7 +73,7 @@ def test_estimator_and_loops_rest_while_samples_go_on():
 
 
 def test_a_rover_steers_to_the_right_and_drives():
-    kernel, flight = _body(Rover(sensors="perfect"))
+    kernel, flight = _body(WheeledRover(sensors="perfect"))
     flight.drive_motors([0.5, 0.3])
     _run(kernel, 2 * S)
     _, _, yaw = quaternion_to_euler(flight.truth().attitude)

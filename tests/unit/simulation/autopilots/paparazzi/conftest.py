@@ -17,7 +17,7 @@ from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
-from volery.simulation.world.body_specs import Battery, Multirotor
+from volery.simulation.world.body_specs import BatteryPack, Multirotor
 from volery.simulation.world.environment_models import Wind
 
 FRAME = LocalFrame(48.0, 11.0, 500.0)
@@ -33,7 +33,7 @@ class Craft:
         warm: bool = True,
         parameters: Mapping[str, float] | None = None,
         through_bytes: bool = False,
-        battery: Battery | None = None,
+        battery: BatteryPack | None = None,
         wind: Wind | None = None,
     ) -> None:
         self.kernel = VirtualKernel()

@@ -13,7 +13,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
-from volery.simulation.world.body_specs import Rover
+from volery.simulation.world.body_specs import WheeledRover
 
 NO_RC = 0
 Make = Callable[..., Any]
@@ -25,7 +25,7 @@ def test_it_is_found_by_its_name() -> None:
 
 def test_there_is_no_rover() -> None:
     kernel = VirtualKernel()
-    _, flights = make_world(kernel.now, [Rover()], seed=1, frame=LocalFrame(48.0, 11.0, 500.0))
+    _, flights = make_world(kernel.now, [WheeledRover()], seed=1, frame=LocalFrame(48.0, 11.0, 500.0))
     with pytest.raises(UsageError, match=r"paparazzi has no rover; it has multirotor"):
         FIRMWARE.create(kernel, flights[0])
 

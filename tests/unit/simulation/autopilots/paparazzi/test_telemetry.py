@@ -14,7 +14,7 @@ from volery.base.time import S
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.simulation.autopilots.paparazzi.parameters import read_setting
-from volery.simulation.world.body_specs import Battery
+from volery.simulation.world.body_specs import BatteryPack
 
 Make = Callable[..., Any]
 
@@ -101,7 +101,7 @@ def test_the_fixs_velocity_is_along_the_earths_axes(craft: Any) -> None:
 
 
 def test_the_battery(make: Make) -> None:
-    craft = make(battery=Battery(capacity_ah=4.0, left=0.5))
+    craft = make(battery=BatteryPack(capacity_ah=4.0, left=0.5))
     craft.guided()
     craft.run(10.0)
     energy, status = craft.last("ENERGY"), craft.last("ROTORCRAFT_STATUS")

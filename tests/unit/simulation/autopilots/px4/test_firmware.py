@@ -21,14 +21,14 @@ from volery.simulation.autopilots.px4.event_interface import ArmingChecks, armin
 from volery.simulation.autopilots.px4.flight_modes import apply_expo, interpolated
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
 from volery.simulation.autopilots.px4.offboard import (
-    Joystick,
+    ManualControlState,
+    OffboardSetpoints,
     OffboardTarget,
-    SetpointStream,
     StickDeflection,
     attitude_target,
     deflection,
 )
-from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.simulation.world.body_specs import Multirotor, WheeledRover
 
 
 def test_a_mode_is_two_numbers_in_one() -> None:
@@ -52,7 +52,7 @@ def test_sticks_are_centred_at_500_and_stay_within_their_way(
 
 
 def test_sticks_that_come_back_have_not_moved() -> None:
-    sticks = Joystick()
+    sticks = ManualControlState()
     assert sticks.receive(StickDeflection(pitch=0.9), S) == 0.0
     assert not sticks.moved(0.3)
     sticks.valid = False
@@ -63,7 +63,7 @@ def test_sticks_that_come_back_have_not_moved() -> None:
 
 
 def test_a_stream_lives_as_long_as_it_may() -> None:
-    stream = SetpointStream()
+    stream = OffboardSetpoints()
     assert not stream.alive(0, S)
     stream.receive(OffboardTarget(position=(0.0, 0.0, -5.0)), S)
     assert stream.alive(2 * S, S)
@@ -129,7 +129,7 @@ def test_texts_wait_for_a_station_keep_their_distance_and_the_newest_four() -> N
 def flown(kind: str, seed: int, wanted: frozenset[str] | None = None) -> list[tuple[Any, ...]]:
     """All messages that one link receives during a short flight or drive; it may state which it uses."""
     kernel = VirtualKernel()
-    spec = Multirotor() if kind == "multirotor" else Rover()
+    spec = Multirotor() if kind == "multirotor" else WheeledRover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
     autopilot = FIRMWARE.create(kernel, flights[0], warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.ros.messages.dji_constants import Source
+from volery.ros.messages.dji_constants import DocumentedBehaviour
 from volery.simulation.autopilots.dji import firmware as simulated
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters
 from volery.vehicles.drivers.dji import driver
@@ -42,7 +42,7 @@ def test_every_assumption_is_in_a_table(heading: str, assumed: Mapping[str, str]
     ],
 )
 def test_every_documented_behaviour_is_in_a_table_with_its_source(
-    heading: str, documented: Mapping[str, Source]
+    heading: str, documented: Mapping[str, DocumentedBehaviour]
 ) -> None:
     expected = [f"| {subject} | {one.what} | {one.whom} |" for subject, one in documented.items()]
     assert table(heading, "| what | documented | by whom |") == expected

@@ -28,7 +28,7 @@ from volery.vehicles import Drone, Vehicle
 from volery.vehicles.drivers.mavros import MAVROS
 from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.rtcm import crc24q
-from volery.vehicles.services import Item
+from volery.vehicles.services import PlanItem
 from volery.vehicles.vehicle_plan import Circle, Plan
 
 KNOWN = {"ardupilot": ("WP_SPD", "FENCE_ENABLE"), "px4": ("MPC_XY_CRUISE", "GF_ACTION")}
@@ -63,9 +63,9 @@ class MavrosStrip(Airstrip):
 BOTH = pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 
 
-def waypoint(east: float, north: float) -> Item:
+def waypoint(east: float, north: float) -> PlanItem:
     place = at(east, north)
-    return Item(16, 3, (0.0, 0.0, 0.0, nan), place.latitude, place.longitude, 10.0)
+    return PlanItem(16, 3, (0.0, 0.0, 0.0, nan), place.latitude, place.longitude, 10.0)
 
 
 @BOTH

@@ -15,7 +15,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.links.pprzlink_messages import TELEMETRY, Field, message_names, message_type
+from volery.links.pprzlink_messages import TELEMETRY, PayloadField, message_names, message_type
 from volery.vehicles.drivers.paparazzi import open_driver
 
 ORIGIN = {"lat0": 434622222, "lon0": 12733333, "alt0": 233_500, "hmsl0": 185_000}
@@ -135,7 +135,7 @@ INTEGERS = {"b": (-128, 127), "B": (0, 255), "h": (-(2**15), 2**15 - 1), "H": (0
 INTEGERS |= {"i": (-(2**31), 2**31 - 1), "I": (0, 2**32 - 1)}
 
 
-def values(field: Field) -> st.SearchStrategy[Any]:
+def values(field: PayloadField) -> st.SearchStrategy[Any]:
     if field.text:
         return st.text(max_size=40)
     one: st.SearchStrategy[Any] = (

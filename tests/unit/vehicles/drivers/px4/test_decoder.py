@@ -19,9 +19,9 @@ from volery.vehicles.drivers.px4.events import (
     KNOWN_EVENTS,
     REPORT_BEGINS,
     REPORT_ENDS,
-    ArmingChecks,
-    Event,
     EventTexts,
+    FailingChecks,
+    ReportedEvent,
     event_id,
     event_text,
     path_of_events,
@@ -216,10 +216,10 @@ def test_modes_of_1_15_to_1_17(number: int, name: str) -> None:
     assert mode_name(number) == name
 
 
-def report(*failing: Event, can_arm: int) -> ArmingChecks:
-    checks = ArmingChecks()
+def report(*failing: ReportedEvent, can_arm: int) -> FailingChecks:
+    checks = FailingChecks()
     summary = bytes(17) + struct.pack("<II", can_arm, can_arm)
-    for event in (Event(REPORT_BEGINS, 8, 0, summary), *failing, Event(REPORT_ENDS, 8, 0)):
+    for event in (ReportedEvent(REPORT_BEGINS, 8, 0, summary), *failing, ReportedEvent(REPORT_ENDS, 8, 0)):
         checks.handle_event(event)
     return checks
 
@@ -227,15 +227,15 @@ def report(*failing: Event, can_arm: int) -> ArmingChecks:
 def test_a_check_that_only_warns_is_no_reason() -> None:
     """As PX4 1.17 reports without a transmitter: the warning is for all modes, and it can arm in Hold."""
     hold = 1 << MODES[HOLD].state
-    warning = Event(event_id("check_modes_manual_control"), 4, ALL_MODES)
-    low = Event(event_id("check_battery_low"), 4, ALL_MODES)
+    warning = ReportedEvent(event_id("check_modes_manual_control"), 4, ALL_MODES)
+    low = ReportedEvent(event_id("check_battery_low"), 4, ALL_MODES)
     assert report(warning, low, can_arm=hold).reasons(HOLD) == []
     assert report(warning, low, can_arm=hold).lasting(HOLD) == []
     assert report(warning, low, can_arm=0).reasons(HOLD) == ["low battery"]
     assert report(warning, low, can_arm=0).lasting("MANUAL") == ["no manual control input"]
-    missing = Event(event_id("check_modes_mission"), 6, ALL_MODES)  # COM_ARM_MIS_REQ
+    missing = ReportedEvent(event_id("check_modes_mission"), 6, ALL_MODES)  # COM_ARM_MIS_REQ
     assert report(warning, missing, can_arm=0).lasting(HOLD) == ["no valid mission available"]
-    station = Event(event_id("check_rc_dl_no_dllink"), 3, ALL_MODES)
+    station = ReportedEvent(event_id("check_rc_dl_no_dllink"), 3, ALL_MODES)
     assert report(station, can_arm=0).lasting(HOLD) == []  # heartbeats are lost on this very link
 
 
@@ -272,9 +272,9 @@ OWN_EVENTS = {
 def test_texts_of_events_from_the_vehicles_own_file() -> None:
     packed = lzma.compress(json.dumps(OWN_EVENTS).encode())
     texts = EventTexts(uncompressed("/etc/extras/all_events.json.xz", packed))
-    own = Event(0x01000011, 3, ALL_MODES, struct.pack("<IBf", ALL_MODES, 3, 7.25).ljust(40, b"\0"))
+    own = ReportedEvent(0x01000011, 3, ALL_MODES, struct.pack("<IBf", ALL_MODES, 3, 7.25).ljust(40, b"\0"))
     assert texts.text(own) == "Wind 7.2 m/s at the nest, <?"
-    assert texts.text(Event(0x01000012, 3, 0)) == ""
+    assert texts.text(ReportedEvent(0x01000012, 3, 0)) == ""
     checks = report(own, can_arm=0)
     assert checks.reasons(HOLD) == ["event 0x01000011"]
     assert not checks.knows(own)
