@@ -20,7 +20,7 @@ from pymoo.problems import get_problem
 
 from volery.explore.points import CampaignRow, VariantPoint
 from volery.explore.search import front_of, hypervolume, search
-from volery.explore.space import RangeParameter
+from volery.explore.space import Range
 
 PROBLEMS = ("zdt1", "zdt2", "zdt3", "zdt4", "zdt6", "dtlz2")
 NOISE = 0.05
@@ -29,7 +29,7 @@ NOISE = 0.05
 def our_search(problem: Any, seed: int, evaluations: int, noise: float = 0.0) -> Any:
     """Return the true objectives of the front that the search reports."""
     space = {
-        f"x{n}": RangeParameter(float(low), float(high))
+        f"x{n}": Range(float(low), float(high))
         for n, (low, high) in enumerate(zip(problem.xl, problem.xu, strict=True))
     }
     names = [f"f{n}" for n in range(problem.n_obj)]

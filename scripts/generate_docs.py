@@ -417,7 +417,7 @@ _FAULT_CLASSES = {cls.__name__ for cls in FAULTS.values()}
 
 def _title(name: str) -> str:
     """Return the heading of a class of the model: ``AllocationText`` gives ``Allocation``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Text")).capitalize()
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Text").removesuffix("Spec")).capitalize()
 
 
 def versions() -> str:

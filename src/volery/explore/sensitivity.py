@@ -21,7 +21,7 @@ from volery.base.time import Ns, S
 from volery.explore.flight_phases import EVERYWHERE, Phases
 from volery.explore.points import CampaignRow, Evaluate, Value, VariantPoint
 from volery.explore.search import Discard, Objective, search
-from volery.explore.space import Choices, RangeParameter, Space
+from volery.explore.space import Choices, Range, Space
 from volery.explore.specification import run_seed
 from volery.explore.statistics import LEVEL, Array, Interval
 from volery.model.faults import (
@@ -224,7 +224,7 @@ class Margin:
 def margin(  # noqa: PLR0913  # each is an option
     evaluate: Evaluate,
     path: str,
-    parameter: RangeParameter,
+    parameter: Range,
     requirement: str,
     *,
     worse: str = "greater",

@@ -70,7 +70,7 @@ class Choices:
 
 
 @dataclass(frozen=True)
-class RangeParameter:
+class Range:
     """A parameter with all numbers between two.
 
     Attributes:
@@ -258,7 +258,7 @@ class DistributedParameter:
         raise UsageError(f"a distribution has no grid; choose another plan: {choices(METHODS[1:])}")
 
 
-Parameter = Choices | RangeParameter | DistributedParameter
+Parameter = Choices | Range | DistributedParameter
 
 Space = Mapping[str, Parameter]
 """Parameters by the paths that they set, joined by commas if they are several, or by ``scenario`` and

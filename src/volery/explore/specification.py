@@ -26,7 +26,7 @@ from volery.explore.space import (
     Choices,
     DistributedParameter,
     Parameter,
-    RangeParameter,
+    Range,
     SamplingPlan,
 )
 from volery.model.assembly import change_from_option, model_file, read_tree
@@ -195,15 +195,13 @@ def _number(value: Any) -> tuple[float, str]:
     return number, text[len(digits) :].strip()
 
 
-def _range(
-    low: Any, high: Any, *, steps: int = 0, log: bool = False, integer: bool = False
-) -> RangeParameter:
+def _range(low: Any, high: Any, *, steps: int = 0, log: bool = False, integer: bool = False) -> Range:
     numbers, unit = _numbers({"from": low, "to": high})
     if not numbers["from"] < numbers["to"]:
         raise UsageError(f"a range goes up: {low} is not less than {high}")
     if log and numbers["from"] <= 0.0:
         raise UsageError(f"a logarithmic range begins above 0, not at {low}")
-    return RangeParameter(numbers["from"], numbers["to"], unit, log, integer, steps)
+    return Range(numbers["from"], numbers["to"], unit, log, integer, steps)
 
 
 def parameter_text(parameter: Parameter) -> Any:
@@ -224,7 +222,7 @@ def parameter_text(parameter: Parameter) -> Any:
                 if np.isfinite(number)
             }
         }
-    ends = RangeParameter(parameter.low, parameter.high, parameter.unit)
+    ends = Range(parameter.low, parameter.high, parameter.unit)
     flags = {"steps": parameter.steps, "log": parameter.log, "integer": parameter.integer}
     return {"from": ends.value(ends.low), "to": ends.value(ends.high)} | {
         key: flag for key, flag in flags.items() if flag

@@ -14,9 +14,9 @@ from volery.explore.search import (
     read_objective,
     search,
 )
-from volery.explore.space import Choices, RangeParameter
+from volery.explore.space import Choices, Range
 
-UNIT = {f"x{number}": RangeParameter(0.0, 1.0) for number in range(6)}
+UNIT = {f"x{number}": Range(0.0, 1.0) for number in range(6)}
 BOTH = ("minimise cost", "minimise time")
 
 
@@ -124,7 +124,7 @@ def test_what_noise_hides_is_not_reported_as_a_front():
 SMALL = {
     "x0": Choices([0.1, 0.4, 0.9]),
     "allocation": Choices(["one", "two"]),
-    "n": RangeParameter(1, 2, integer=True),
+    "n": Range(1, 2, integer=True),
 }
 
 

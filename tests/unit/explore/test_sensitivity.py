@@ -10,13 +10,13 @@ from volery.explore.flight_phases import EVERYWHERE
 from volery.explore.points import FAILED, CampaignRow
 from volery.explore.run_process import read_variant
 from volery.explore.sensitivity import fault_campaign, margin, sensitivity, worst_case
-from volery.explore.space import Choices, RangeParameter
+from volery.explore.space import Choices, Range
 from volery.model.faults import FAULTS
 
 MARGINS = 100
 """Margins whose coverage is counted: with a true one of 90 % the test would fail 19 times in 20."""
 
-SPACE = {name: RangeParameter(-pi, pi) for name in ("a", "b", "c")}
+SPACE = {name: Range(-pi, pi) for name in ("a", "b", "c")}
 FIRST = {"a": 0.3139, "b": 0.4424, "c": 0.0}
 TOTAL = {"a": 0.5576, "b": 0.4424, "c": 0.2437}
 
@@ -46,7 +46,7 @@ def test_morris_finds_what_matters_and_a_failed_run_costs_its_trajectory_only():
         rows[5] = CampaignRow(5, rows[5].point, FAILED, observables={"y": 1e9})
         return rows
 
-    found = sensitivity(evaluate, {**SPACE, "d": RangeParameter(0, 1)}, "y", size=20)
+    found = sensitivity(evaluate, {**SPACE, "d": Range(0, 1)}, "y", size=20)
     assert found.runs == 100
     assert found.left_out == 1
     assert found.parameters[-1].parameter == "d"
@@ -60,7 +60,7 @@ def test_morris_finds_what_matters_and_a_failed_run_costs_its_trajectory_only():
         ({"method": "anova"}, "morris or sobol"),
         ({"method": "sobol", "size": 100}, "power of 2"),
         ({"size": 1}, "2 and more"),
-        ({"space": {"a": RangeParameter(0, 1)}}, "two parameters"),
+        ({"space": {"a": Range(0, 1)}}, "two parameters"),
         ({"space": {**SPACE, "d": Choices([1, 2, 3])}}, "no order"),
         ({"quantity": "z"}, "no run observed 'z'"),
     ],
@@ -91,9 +91,7 @@ class Windy:
 
 def test_margins_contain_the_limit_as_often_as_they_say():
     truth = 12.0 - np.log(9.0) / 2.0  # met with a probability of 0.9
-    found = [
-        margin(Windy(root), "wind", RangeParameter(0.0, 20.0, "m/s"), "in_time") for root in range(MARGINS)
-    ]
+    found = [margin(Windy(root), "wind", Range(0.0, 20.0, "m/s"), "in_time") for root in range(MARGINS)]
     ends = np.array([[float(end.split()[0]) for end in (one.holds, one.fails)] for one in found])
     assert np.mean((ends[:, 0] <= truth) & (truth <= ends[:, 1])) >= 0.95
     assert np.diff(ends).max() < 5.0
@@ -101,19 +99,19 @@ def test_margins_contain_the_limit_as_often_as_they_say():
 
 
 def test_ends_of_margins():
-    everywhere = margin(Windy(1), "wind", RangeParameter(0.0, 5.0, "m/s"), "in_time")
+    everywhere = margin(Windy(1), "wind", Range(0.0, 5.0, "m/s"), "in_time")
     assert everywhere.fails is None
     assert str(everywhere) == "in_time holds up to 5.0 m/s, the end of the range"
     assert (
-        str(margin(Windy(1), "wind", RangeParameter(15.0, 20.0, "m/s"), "in_time"))
+        str(margin(Windy(1), "wind", Range(15.0, 20.0, "m/s"), "in_time"))
         == "in_time fails at 15.0 m/s already"
     )
-    less = margin(Windy(1), "wind", RangeParameter(8.0, 20.0, "m/s"), "in_time", worse="less")
+    less = margin(Windy(1), "wind", Range(8.0, 20.0, "m/s"), "in_time", worse="less")
     assert less.holds is None
     with pytest.raises(UsageError, match="'late'"):
-        margin(Windy(1), "wind", RangeParameter(0.0, 20.0, "m/s"), "late")
+        margin(Windy(1), "wind", Range(0.0, 20.0, "m/s"), "late")
     with pytest.raises(UsageError, match="greater"):
-        margin(Windy(1), "wind", RangeParameter(0.0, 20.0, "m/s"), "in_time", worse="more")
+        margin(Windy(1), "wind", Range(0.0, 20.0, "m/s"), "in_time", worse="more")
 
 
 def test_a_failed_run_is_the_worst_case():

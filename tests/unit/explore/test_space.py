@@ -9,14 +9,14 @@ import pytest
 from scipy.stats import beta, lognorm, norm, triang, truncnorm
 
 from volery.base.errors import UsageError
-from volery.explore.space import Choices, DistributedParameter, RangeParameter, SamplingPlan, default_space
+from volery.explore.space import Choices, DistributedParameter, Range, SamplingPlan, default_space
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
 
 SPACE = {
     "a": Choices(["x", "y"]),
-    "b": RangeParameter(0, 10, "m", steps=3),
-    "c": RangeParameter(1, 3, integer=True),
+    "b": Range(0, 10, "m", steps=3),
+    "c": Range(1, 3, integer=True),
 }
 
 
@@ -28,9 +28,9 @@ def numbers(parameter, points=2001):
     ("parameter", "least", "middle", "most"),
     [
         (Choices(["a", "b"]), "a", "b", "b"),
-        (RangeParameter(600, 1500, "MHz"), "600.0 MHz", "1050.0 MHz", "1500.0 MHz"),
-        (RangeParameter(1, 100, log=True), 1.0, 10.0, 100.0),
-        (RangeParameter(1, 4, integer=True), 1, 3, 4),
+        (Range(600, 1500, "MHz"), "600.0 MHz", "1050.0 MHz", "1500.0 MHz"),
+        (Range(1, 100, log=True), 1.0, 10.0, 100.0),
+        (Range(1, 4, integer=True), 1, 3, 4),
         (
             DistributedParameter("normal", {"mean": 5.0, "sd": 1.0, "least": 4.0, "most": 6.0}, "ms"),
             "4.0 ms",
@@ -53,7 +53,7 @@ def test_a_parameter_spans_its_values(parameter, least, middle, most):
 
 
 def test_whole_numbers_are_equally_frequent_and_a_normal_distribution_is_one():
-    found = numbers(RangeParameter(1, 4, integer=True), 4000)
+    found = numbers(Range(1, 4, integer=True), 4000)
     assert {one: found.count(one) for one in set(found)} == {1: 1000, 2: 1000, 3: 1000, 4: 1000}
     spread = numbers(DistributedParameter("normal", {"mean": 5.0, "sd": 2.0}))
     assert fmean(spread) == pytest.approx(5.0, abs=0.01)
@@ -120,7 +120,7 @@ def test_a_sampled_plan_depends_on_its_seed_alone(method):
         (lambda: SamplingPlan("sobl", 8), "did you mean 'sobol'"),
         (lambda: SamplingPlan("random"), "needs its number of points"),
         (lambda: SamplingPlan("sobol", 12), "power of 2"),
-        (lambda: list(SamplingPlan().variants({"a": RangeParameter(0, 1)}, 1)), "needs `steps`"),
+        (lambda: list(SamplingPlan().variants({"a": Range(0, 1)}, 1)), "needs `steps`"),
         (
             lambda: list(
                 SamplingPlan().variants({"a": DistributedParameter("normal", {"mean": 0, "sd": 1})}, 1)

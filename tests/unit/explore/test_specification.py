@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import ModelError, UsageError
-from volery.explore.space import Choices, DistributedParameter, RangeParameter
+from volery.explore.space import Choices, DistributedParameter, Range
 from volery.explore.specification import (
     parameter_from_option,
     read_specification,
@@ -42,8 +42,8 @@ def test_everything_that_can_be_stated_is_read_and_written_again():
     assert (found.fidelity, found.limit_ns, found.memory_b) == ("times", 600 * 10**9, 2e9)
     assert list(found.space.values()) == [
         Choices(["fast", "slow"]),
-        RangeParameter(600, 1500, "MHz"),
-        RangeParameter(0, 8, "m/s", steps=5),
+        Range(600, 1500, "MHz"),
+        Range(0, 8, "m/s", steps=5),
         DistributedParameter("normal", {"mean": 2, "sd": 0.5, "least": 1}, "ms"),
         DistributedParameter("lognormal", {"median": 2, "most": 9, "sigma": 0.3}, "ms"),
         DistributedParameter("triangular", {"least": 1, "mode": 2, "most": 4}, "kg"),
@@ -111,8 +111,8 @@ def test_the_section_is_in_the_model_or_beside_it(tmp_path):
         ("a.b=600 MHz, 1 GHz", "a.b", Choices(["600 MHz", "1 GHz"])),
         ("a.b='x, y'", "a.b", Choices(["x, y"])),
         ("a.b=[x, y]", "a.b", Choices(["x", "y"])),
-        ("a, b=0 m .. 2 m", "a, b", RangeParameter(0, 2, "m")),
-        ("a={from: 1, to: 9, log: true}", "a", RangeParameter(1, 9, log=True)),
+        ("a, b=0 m .. 2 m", "a, b", Range(0, 2, "m")),
+        ("a={from: 1, to: 9, log: true}", "a", Range(1, 9, log=True)),
         (
             "a={triangular: {least: 1 m, mode: 2 m, most: 4 m}}",
             "a",
