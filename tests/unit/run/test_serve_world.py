@@ -121,7 +121,7 @@ def test_a_program_flies_in_the_world_of_a_model_which_records_it(tmp_path: Path
             while True:
                 program.ask(CLIMBING)
 
-    run = answered(session, fly_to_the_end)
+    run = answered(session, fly_to_the_end, ends=False)
     assert run.completed
     assert run.record.outcome.reason == "its time is up"
     times = [answer["timestamp"] for answer in program.answers]
