@@ -11,6 +11,7 @@ import re
 import socket
 import struct
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -51,8 +52,9 @@ class StandingArduPilot:
         self._world = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._world.settimeout(1.0)
         self._address = "127.0.0.1", 9002 + 10 * instance
-        host, port = stated["serial0"].removeprefix("tcpclient:").split(":")
-        self._station = socket.create_connection((host, int(port)))
+        host, port = stated["serial0"].removeprefix("udpclient:").split(":")
+        self._station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._station.connect((host, int(port)))
         self._station.setblocking(False)
         self._mavlink = mavlink.MAVLink(None, srcSystem=int(stated["sysid"]), srcComponent=1)
         self._said = -1.0
@@ -89,10 +91,10 @@ class StandingArduPilot:
         sys.stdout.flush()
 
     def _hear(self) -> None:
-        try:
-            octets = self._station.recv(4096)
-        except BlockingIOError:
-            return
+        octets = b""
+        with suppress(BlockingIOError):
+            while True:
+                octets += self._station.recv(4096)
         for message in self._mavlink.parse_buffer(octets) or []:
             if message.get_type() in ("PARAM_REQUEST_READ", "PARAM_SET"):
                 self._answer(message)

@@ -122,7 +122,8 @@ def test_a_fleet_that_fails_half_way_ends_the_programs_that_run(model, tmp_path)
 
 
 def test_a_program_that_dies_in_a_run_ends_it_with_its_last_words(model, tmp_path):
-    overrides = ["environment.vehicles.first.parameters={SIM_ENDS_AT: 4}"]
+    # in flight: a warm start waits until stated parameters were asked for, from 10 s on
+    overrides = ["environment.vehicles.first.parameters={SIM_ENDS_AT: 12}"]
     run = simulate(model, Options(out=tmp_path / "run"), overrides=overrides)
     assert run.record.outcome.status == "failed"
     assert "first: arducopter ended with exit code 3; its last words: " in run.record.outcome.reason
@@ -145,7 +146,7 @@ def test_a_program_at_an_address_lives_as_long_as_the_connection(program, monkey
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with connect(f"firmware:ardupilot?program={program}&start=warm", within=0.0) as drone:
         assert drone.telemetry.autopilot == "ArduPilot"
-        (folder,) = tmp_path.glob("volery-firmware-*")
+        (folder,) = tmp_path.glob("volery-programs-*")
         assert runs_in(folder)
     assert not folder.exists()
     assert not runs_in(tmp_path)
