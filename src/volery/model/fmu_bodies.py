@@ -71,7 +71,7 @@ class FmuVariables:
 class Fmu:
     """A co-simulation FMU of FMI 2 or 3 that moves a multirotor in place of the simulation's own laws.
 
-    The airframe tells the autopilot what it flies, and gives the battery.
+    The autopilot is configured for the airframe of the vehicle, which also states the battery.
     """
 
     file: Annotated[FilePath, Key("fmu"), FileBeside(), "Its file, relative to the model."]

@@ -250,7 +250,7 @@ class SetpointDriver(Protocol):
 
 
 class ServicesDriver(Protocol):
-    """The part of a driver beside flying: what is on board, what is asked for, a lost link.
+    """What a driver offers beside flying: files, parameters and missions on board, requests, a lost link.
 
     A driver without one of these inherits what stands here.
     """

@@ -446,11 +446,11 @@ class StreamedSetpoint(NamedTuple):
 class FollowMonitor:
     """Notices a vehicle that does nothing of what a stream of set-points asks for.
 
-    It sums up what is asked for over time, and what comes of it: way, turn, lean and climb. A control loop
-    that asks for this and then that asks for nothing in the sum. A vehicle that shows an effect in any of
-    these follows; how well is not judged. Of way by velocity and of turns only what comes in the direction
-    that was asked for counts: a vehicle that swings in front of its own fence, or whose heading is noisy,
-    goes nowhere. Firmware ignores what it does not take without a word:
+    It adds up over time what the set-points demand, and what the vehicle does: way, turn, lean and climb.
+    Opposite demands of a control loop cancel. A vehicle that shows an effect in any of these follows; how
+    well is not judged. Of way by velocity and of turns only what goes in the demanded direction counts: a
+    vehicle that swings in front of its own fence, or whose heading is noisy, goes nowhere. Firmware ignores
+    without a word what it does not take:
     ArduCopter from 4.6 on a single body rate, others a set-point beyond their own fence.
 
     Args:

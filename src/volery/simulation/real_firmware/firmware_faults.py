@@ -4,8 +4,8 @@ Whatever the link of a project carries is the world's, and so are its faults: th
 on a simulated one. A sensor that the firmware simulates itself fails by a parameter of that simulation. It is
 set when the fault appears in the state row of the body, and gets its value back when the fault is over.
 
-Names of parameters differ between versions, so a firmware is asked for all of them after its boot. A fault
-that it cannot be given is refused by name.
+Names of parameters differ between versions, so all of them are read from a firmware after its
+boot. A fault that it cannot be given is refused by name.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class FirmwareInstance(NamedTuple):
         mode_name: Returns the name of a ``custom_mode`` of HEARTBEAT.
         kinds: Values of MAV_TYPE that fit the body.
         arms_lost: Whether its arming checks pass before its estimator has a position.
-        parameters: Names of the parameters that it is asked for, as it must have them.
+        parameters: Names of the parameters that it must have; they are read back after its boot.
     """
 
     process: FirmwareProcess
